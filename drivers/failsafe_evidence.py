@@ -87,6 +87,8 @@ def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
         holding[Condition.EMERGENCY] = ""
     if state is FlightState.LANDING:
         holding[Condition.LANDS_BY_ITSELF] = ""
+    if vehicle.homeward:
+        holding[Condition.FLIES_HOME] = vehicle.homeward
     if state in AIRBORNE and at.mode is DriverMode.CONNECTING:
         holding[Condition.FLEW_AT_START] = ""
     if state in AIRBORNE and at.mode is DriverMode.LANDED:

@@ -36,6 +36,7 @@ class Condition(StrEnum):
     UNORDERED_FLIGHT = auto()
     CUT_IGNORED = auto()
     LANDS_BY_ITSELF = auto()
+    FLIES_HOME = auto()
     STOP_REQUESTED = auto()
     SUPERVISOR_DEAD = auto()
     SUPERVISOR_SILENT = auto()
@@ -130,6 +131,8 @@ def _ends(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.CUT_IGNORED, Reaction.LAND, "it flies although its motors were cut", limits.cut_s,
                  forgets=SLOWLY, modes=frozenset({DriverMode.CUT})),
         Failsafe(Condition.LANDS_BY_ITSELF, Reaction.LAND, "the vehicle lands by itself"),
+        # A return begins with a climb, out of all views and to the ceiling.
+        Failsafe(Condition.FLIES_HOME, Reaction.LAND, "it flies home by itself, in {why}"),
     )  # fmt: skip
 
 

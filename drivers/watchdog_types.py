@@ -114,6 +114,7 @@ class VehicleView(NamedTuple):
     its emergency without starting motors.
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
+    homeward: the mode in which it flies home by itself, or "".
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -137,6 +138,7 @@ class VehicleView(NamedTuple):
     on_floor: bool = False
     height_m: float = 0.0
     away: str = ""
+    homeward: str = ""
 
     @property
     def plausible(self) -> "VehicleView":

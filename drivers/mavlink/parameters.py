@@ -63,6 +63,7 @@ def _lies_in(span: tuple[float, float], value: float) -> bool:
     return span[0] - tolerance <= value <= span[1] + tolerance
 
 
+_NO_RETURN = "a return would climb first, to the ceiling"
 _CENTRE = "our positions are those of its centre"
 
 
@@ -86,6 +87,12 @@ _PX4 = (
     Needed("COM_OBL_RC_ACT", 4, "that failsafe: land"),
     Needed("COM_RC_IN_MODE", 0, "a transmitter's kill and mode switches stay alive, whatever a joystick does"),
     Needed("COM_RCL_EXCEPT", 4, "offboard flight needs no stick", others=(5, 6, 7)),
+    Needed("COM_LOW_BAT_ACT", 2, _NO_RETURN, others=(0,)),
+    Needed("COM_FLTT_LOW_ACT", 1, _NO_RETURN, others=(0,), flown=(0, 3), optional=True),
+    Needed("NAV_RCL_ACT", 3, _NO_RETURN, others=(1,), flown=(0, 3)),
+    Needed("NAV_DLL_ACT", 0, _NO_RETURN, others=(1, 3)),
+    Needed("COM_ACT_FAIL_ACT", 0, _NO_RETURN, others=(1, 2), optional=True),
+    Needed("COM_IMB_PROP_ACT", 0, _NO_RETURN, others=(-1, 2), optional=True),
     Needed("MPC_LAND_CRWL", 0.6, "the last metre of a landing, on which it may have no position", REAL32, (0.3, 1.0)),
     Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32, accepted=(0.1, 4.0)),
 )
@@ -112,7 +119,9 @@ _ARDUPILOT = (
     Needed(
         "FS_EKF_THRESH", 0.8, "with 0 it does not land then, with more than 1 late", REAL32, (0.6, 1), optional=True
     ),
-    Needed("FS_THR_ENABLE", 0, "a throttle failsafe of a transmitter that is off would forbid arming", others=(1, 3)),
+    Needed("FS_THR_ENABLE", 0, f"without a transmitter it would forbid arming; {_NO_RETURN}", others=(3,)),
+    Needed("BATT_FS_LOW_ACT", 1, _NO_RETURN, others=(0, 7), optional=True),
+    Needed("BATT_FS_CRT_ACT", 1, _NO_RETURN, others=(0, 7), optional=True),
 )
 
 

@@ -12,6 +12,8 @@ _JUMP_MS = 1000
 _PIECES = 8
 _NEXT_WITHIN_NS = NS_PER_S // 2
 _RECENT_S = 2
+# A refusal is reported only after its STATUSTEXT: the COMMAND_ACK arrives first.
+_EXPLAIN_NS = 700 * NS_PER_MS
 # An older text explains no present event; ArduPilot's comes just after the heartbeat with the mode.
 _EXPLAINS_NS, _COMES_WITHIN_NS = 4 * NS_PER_S, 200 * NS_PER_MS
 
@@ -72,6 +74,25 @@ class Texts:
         """
         newest = {text: at for at, level, text in self._heard if at >= since_ns and level <= MavSeverity.WARNING}
         return [text + _age(at, now_ns) for text, at in newest.items() if word in text.lower()]
+
+
+class Refusals:
+    """Refused requests, which wait for the texts that explain them."""
+
+    def __init__(self, texts: Texts) -> None:
+        self._texts = texts
+        self._waiting: deque[tuple[int, str]] = deque(maxlen=16)
+
+    def told(self, now_ns: int, failures: deque[str]) -> list[str]:
+        """Take all failures from a queue; return those whose texts have come by now, with these."""
+        told = []
+        while failures:
+            self._waiting.append((now_ns, failures.popleft()))
+        while self._waiting and now_ns - self._waiting[0][0] >= _EXPLAIN_NS:
+            at_ns, text = self._waiting.popleft()
+            reasons = self._texts.reasons(at_ns - _EXPLAIN_NS)
+            told.append(f"{text} ({'; '.join(reasons)})" if reasons else text)
+        return told
 
 
 class Explanations:

@@ -8,32 +8,30 @@ from drivers.datagrams import DatagramLog
 from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
 from drivers.mavlink.convert import LIMITS
-from drivers.mavlink.latest_telemetry import FRESH_NS, HEARTBEAT_NS, LatestTelemetry
-from drivers.mavlink.lift_off import credible
+from drivers.mavlink.latest_telemetry import LatestTelemetry
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.other_stations import GivenOrders, is_answer_to
 from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.readiness import Readiness
+from drivers.mavlink.reported_flight import ReportedFlight
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import MavlinkSession, streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
-from drivers.mavlink.texts import BootClock, Texts
+from drivers.mavlink.texts import BootClock, Refusals, Texts
 from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import FIRST_SIGHT_NS, VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, Landed, MavSeverity, SensorBits
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, MavSeverity, SensorBits
 from drivers.plausibility.health import Health
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import Estimate, FlightState, Vector3
-from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
+from groundstation.bus.messages import Estimate, Vector3
+from groundstation.time_units import NEVER_NS, NS_PER_S
 
 _ASKS_NS = 3 * NS_PER_S
-# A refusal is reported only after its STATUSTEXT: the COMMAND_ACK arrives first.
-_EXPLAIN_NS = 700 * NS_PER_MS
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 
 
@@ -66,13 +64,14 @@ class MavlinkVehicle:
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
         self.misfit, self._namesakes = identity.Misfit(self.flavour, self.system), identity.Namesakes(self.system)
+        self._flight = ReportedFlight(self.flavour, self.orders, self.misfit)
         self._traffic = Traffic()
         self._plausibility = MotionMonitor(LIMITS)
         self._refused: Counter[str] = Counter()
         self._said, self._boot_clock = Texts(), BootClock()
         self._readiness = Readiness(self.flavour, self._session, self._requests, self._said)
         self._jumps: deque[int] = deque(maxlen=8)
-        self._refusals: deque[tuple[int, str]] = deque(maxlen=16)
+        self._refusals = Refusals(self._said)
 
     def use(self, link: MavlinkLink) -> None:
         """Send through another link from now on."""
@@ -123,7 +122,7 @@ class MavlinkVehicle:
         position = convert.position_from_local(message)
         # As received: an attitude extrapolated by its age no longer shows that it is stuck.
         sample = convert.sample_from_local(now_ns, message, known.attitude, known.inertial)
-        report = self._plausibility.update(sample, self._state(now_ns, known))
+        report = self._plausibility.update(sample, self._flight.state(now_ns, known))
         self._publisher.velocity(now_ns, velocity, attitude, report)
         return replace(known, moved_ns=now_ns, velocity_m_s=velocity, position_m=position)
 
@@ -180,53 +179,22 @@ class MavlinkVehicle:
     def view(self, now_ns: int) -> VehicleView:
         """Return the vehicle's last reported state."""
         known = self.telemetry
-        fresh = self._is_heard(now_ns, known)
-        state = self._state(now_ns, known)
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
-        if not known.heartbeat_ns or not self._landed(now_ns, known):
-            state = FlightState.UNKNOWN
-        elif state is FlightState.FLYING and self.orders.starting and not self.orders.lift.lifted:
-            state = FlightState.TAKING_OFF
-        elif state is FlightState.FLYING and convert.is_still(known.velocity_m_s):
-            state = FlightState.HOVERING
-        elif state is FlightState.LANDED and self.orders.starting:
-            state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
         velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(now_ns, known.custom_mode) else None
         doubled = self._namesakes.words(now_ns, self._link.rejected.doubled(self.system))
         not_ready = doubled or self._readiness.why_not(now_ns, known)
         battery = known.batteries.charge(now_ns)
-        lost_s, mute = self.vision.lost_s(now_ns), "" if fresh else self._mute(now_ns, known)
+        lost_s, mute = self.vision.lost_s(now_ns), self._flight.mute(now_ns, known)
         return VehicleView(
-            state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s,
-            unlocated=self.vision.missed, mute=mute,
+            self._flight.told(now_ns, known), self._flight.is_heard(now_ns, known), battery, not_ready,
+            unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, unlocated=self.vision.missed, mute=mute,
+            homeward=self._flight.homeward(now_ns, known),
         )  # fmt: skip
-
-    def _mute(self, now_ns: int, known: LatestTelemetry) -> str:
-        if words := self.misfit.words(now_ns):
-            return words
-        # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
-        heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
-        return "it tells no velocity, as its own estimator knows none" if heard and known.moved_ns else ""
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:
         # Its commands include its drift: that is no control error.
         (x, y, z), (drift_x, drift_y, drift_z) = known.velocity_m_s, self.orders.drift.drift(now_ns)
         return x - drift_x, y - drift_y, z - drift_z
-
-    def _landed(self, now_ns: int, known: LatestTelemetry) -> int:
-        flew = self.orders.lift.lifted and not self.orders.starting and bool(known.base_mode & ARMED)
-        return credible(known.landed, now_ns - known.landed_ns, flew)
-
-    def _state(self, now_ns: int, known: LatestTelemetry) -> FlightState:
-        landed = self._landed(now_ns, known)
-        if known.disarmed_aloft(now_ns, landed):
-            return FlightState.LANDING
-        return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, landed)
-
-    def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
-        # In the air, silence is judged by velocities; on the ground there may be none before the first pose.
-        newest = known.heard_ns if self._landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
-        return known.heartbeat_ns > 0 and now_ns - newest < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send the vehicle its commands for the decision, poses for its estimator, and pending requests."""
@@ -240,7 +208,7 @@ class MavlinkVehicle:
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
-        landed = self._landed(now_ns, known)
+        landed = self._flight.landed(now_ns, known)
         self.orders.pilot.transmitter = known.transmitter
         setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, landed, *up)
         messages += self._requests.due(now_ns)
@@ -281,12 +249,7 @@ class MavlinkVehicle:
             jump_s = self._jumps.popleft() / 1000
             why = "it restarted, or two vehicles share its system id"
             events.append((MavSeverity.WARNING, f"its clock jumped by {jump_s:.0f} s: {why}"))
-        while self._requests.failures:
-            self._refusals.append((now_ns, self._requests.failures.popleft()))
-        while self._refusals and now_ns - self._refusals[0][0] >= _EXPLAIN_NS:
-            at_ns, text = self._refusals.popleft()
-            reasons = self._said.reasons(at_ns - _EXPLAIN_NS)
-            events.append((MavSeverity.WARNING, f"{text} ({'; '.join(reasons)})" if reasons else text))
+        events.extend((MavSeverity.WARNING, text) for text in self._refusals.told(now_ns, self._requests.failures))
 
     def _feed(self, now_ns: int, known: LatestTelemetry) -> list[tuple[object, ...]]:
         if now_ns < self._next_vision_ns or (attitude := known.attitude_at(now_ns)) is None:

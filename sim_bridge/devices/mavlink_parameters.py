@@ -19,6 +19,10 @@ _PX4_FACTORY: dict[str, float] = {
     "COM_OBL_RC_ACT": 0,
     "COM_RC_IN_MODE": 3,
     "COM_RCL_EXCEPT": 0,
+    "COM_LOW_BAT_ACT": 0,
+    "COM_FLTT_LOW_ACT": 3,
+    "COM_ACT_FAIL_ACT": 0,
+    "COM_IMB_PROP_ACT": 0,
     "NAV_DLL_ACT": 0,
     "NAV_RCL_ACT": 2,
 }
@@ -50,6 +54,8 @@ _PX4_INDOOR: dict[str, float] = {
     "EKF2_EVP_NOISE": 0.05,
     "COM_RC_IN_MODE": 0,
     "COM_RCL_EXCEPT": 4,
+    "COM_FLTT_LOW_ACT": 1,
+    "NAV_RCL_ACT": 3,
 }
 _COPTER_FACTORY: dict[str, float] = {
     "SYSID_THISMAV": 1,
@@ -69,6 +75,8 @@ _COPTER_FACTORY: dict[str, float] = {
     "LAND_SPEED": 50,
     "FS_EKF_ACTION": 1,
     "FS_THR_ENABLE": 1,
+    "BATT_FS_LOW_ACT": 0,
+    "BATT_FS_CRT_ACT": 0,
     "FS_OPTIONS": 16,
     "DISARM_DELAY": 10,
     "VISO_DELAY_MS": 10,

@@ -19,6 +19,7 @@ EVIDENCE: dict[Condition, str] = {
     Condition.UNORDERED_FLIGHT: "it says that it flies while it should stand",
     Condition.CUT_IGNORED: "it says that it flies, though not that it lands, while it is told to cut its motors",
     Condition.LANDS_BY_ITSELF: "it says LANDING without a LAND",
+    Condition.FLIES_HOME: "MAVLink: its heartbeat says AUTO.RETURN (PX4), RTL, SMART_RTL or AUTO_RTL (ArduPilot)",
     Condition.STOP_REQUESTED: "SIGTERM to the driver",
     Condition.SUPERVISOR_DEAD: "the supervisor's process is gone",
     Condition.SUPERVISOR_SILENT: "no heartbeat of the supervisor for 0.3 s",

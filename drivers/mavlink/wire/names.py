@@ -161,6 +161,8 @@ class CopterMode(IntEnum):
     POSHOLD = 16
     BRAKE = 17
     GUIDED_NOGPS = 20
+    SMART_RTL = 21
+    AUTO_RTL = 27
 
 
 def px4_mode(main: int, sub: int = 0) -> int:
@@ -176,6 +178,17 @@ def guided_mode(flavour: Flavour) -> int:
 def land_mode(flavour: Flavour) -> int:
     """Return the custom_mode in which it lands by itself."""
     return px4_mode(Px4Main.AUTO, Px4Auto.LAND) if flavour is Flavour.PX4 else CopterMode.LAND
+
+
+_HOMEWARD = {
+    Flavour.PX4: frozenset((px4_mode(Px4Main.AUTO, Px4Auto.RETURN),)),
+    Flavour.ARDUPILOT: frozenset((CopterMode.RTL, CopterMode.SMART_RTL, CopterMode.AUTO_RTL)),
+}
+
+
+def flies_home(flavour: Flavour, custom_mode: int) -> bool:
+    """Return whether it flies to its home by itself in a mode."""
+    return custom_mode in _HOMEWARD[flavour]
 
 
 _STICKS = {

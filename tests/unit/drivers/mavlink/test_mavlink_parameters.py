@@ -94,3 +94,28 @@ def test_a_value_may_do_for_a_take_off_that_setup_changes_all_the_same(value, di
 def test_our_positions_are_used_as_they_are_and_their_loss_is_acted_upon(name, value, good):
     flavour = Flavour.PX4 if name.startswith("EKF2") else Flavour.ARDUPILOT
     assert (fault(of(name, flavour), {name: value}) == "") is good
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "returns"),
+    [
+        ("FS_THR_ENABLE", (0, 3), (1, 2, 4, 5, 6)),
+        ("BATT_FS_LOW_ACT", (0, 1, 7), (2, 3, 4, 6)),
+        ("BATT_FS_CRT_ACT", (0, 1, 7), (2, 3, 4, 6)),
+        ("COM_LOW_BAT_ACT", (0, 2), (3,)),
+        ("NAV_DLL_ACT", (0, 1, 3), (2,)),
+        ("COM_ACT_FAIL_ACT", (0, 1, 2), (3,)),
+        ("COM_IMB_PROP_ACT", (-1, 0, 2), (1,)),
+    ],
+)
+def test_no_failsafe_of_the_autopilot_flies_home(name, good, returns):
+    flavour = Flavour.PX4 if name.startswith(("COM", "NAV")) else Flavour.ARDUPILOT
+    assert not any(fault(of(name, flavour), {name: value}) for value in good)
+    assert all("climb" in fault(of(name, flavour), {name: value}) for value in returns)
+
+
+@pytest.mark.parametrize(("name", "best"), [("NAV_RCL_ACT", 3), ("COM_FLTT_LOW_ACT", 1)])
+def test_returns_that_end_no_offboard_flight_or_come_from_the_factory_fly_with_a_warning(name, best):
+    factory = {"NAV_RCL_ACT": 2, "COM_FLTT_LOW_ACT": 3}[name]
+    assert not fault(of(name), {name: factory}) and "climb" in difference(of(name), {name: factory})
+    assert not difference(of(name), {name: best})

@@ -63,6 +63,7 @@ DEVIATIONS = {
     "state LOST": always(0.5, 2.9, Condition.STATE_UNKNOWN, state=FlightState.LOST),
     "an emergency": always(0.1, 0.1, Condition.EMERGENCY, state=FlightState.EMERGENCY),
     "it lands": always(0.1, 0.1, Condition.LANDS_BY_ITSELF, state=FlightState.LANDING),
+    "it flies home": always(0.1, 0.1, Condition.FLIES_HOME, homeward="RTL"),
     "battery low": always(3.2, 3.2, Condition.BATTERY_LOW, battery=0.1),
     "battery low but for moments": partly(2.9, 3.0, 3.5, 3.5, Condition.BATTERY_LOW, battery=0.1),
     "battery unknown": always(3.2, 3.2, Condition.BATTERY_UNKNOWN, battery=None),
@@ -96,7 +97,12 @@ def named(reason, conditions):
 
 
 # A silent vehicle cannot report other faults.
-HIDES = {"fresh": {"state"}, "unsound": {"state"}, "tracker_speaks": {"epoch", "converged"}, "epoch": {"converged"}}
+HIDES = {
+    "fresh": {"state", "homeward"},
+    "unsound": {"state", "homeward"},
+    "tracker_speaks": {"epoch", "converged"},
+    "epoch": {"converged"},
+}
 
 
 def fly(bench, mode):

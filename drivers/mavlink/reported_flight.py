@@ -1,0 +1,63 @@
+"""Judges a vehicle's flight by its reports: what it does, whether it is heard, what its reports lack. Pure."""
+
+from drivers.mavlink import convert
+from drivers.mavlink.commands import Orders
+from drivers.mavlink.identity import Misfit
+from drivers.mavlink.latest_telemetry import FRESH_NS, HEARTBEAT_NS, LatestTelemetry
+from drivers.mavlink.lift_off import credible
+from drivers.mavlink.wire.names import ARMED, Flavour, Landed, flies_home, mode_name
+from groundstation.bus.messages import FlightState
+
+
+class ReportedFlight:
+    """The flight of one vehicle; orders: those that it has, misfit: why its frames may be of no use."""
+
+    def __init__(self, flavour: Flavour, orders: Orders, misfit: Misfit) -> None:
+        self._flavour, self._orders, self._misfit = flavour, orders, misfit
+
+    def told(self, now_ns: int, known: LatestTelemetry) -> FlightState:
+        """Return the state to act upon, by its reports and its orders."""
+        starts, state = self._orders.starting, self.state(now_ns, known)
+        if not known.heartbeat_ns or not self.landed(now_ns, known):
+            return FlightState.UNKNOWN
+        if state is FlightState.FLYING and starts and not self._orders.lift.lifted:
+            return FlightState.TAKING_OFF
+        if state is FlightState.FLYING and convert.is_still(known.velocity_m_s):
+            return FlightState.HOVERING
+        if state is FlightState.LANDED and starts and known.base_mode & ARMED:
+            return FlightState.TAKING_OFF
+        return state
+
+    def state(self, now_ns: int, known: LatestTelemetry) -> FlightState:
+        """Return the state that it reports."""
+        landed = self.landed(now_ns, known)
+        if known.disarmed_aloft(now_ns, landed):
+            return FlightState.LANDING
+        return convert.flight_state_from(self._flavour, known.base_mode, known.custom_mode, known.status, landed)
+
+    def landed(self, now_ns: int, known: LatestTelemetry) -> int:
+        """Return its MAV_LANDED_STATE, as far as it is credible."""
+        flew = self._orders.lift.lifted and not self._orders.starting and bool(known.base_mode & ARMED)
+        return credible(known.landed, now_ns - known.landed_ns, flew)
+
+    def is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
+        """Return whether its telemetry is fresh."""
+        # In the air, silence is judged by velocities; on the ground there may be none before the first pose.
+        newest = known.heard_ns if self.landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
+        return known.heartbeat_ns > 0 and now_ns - newest < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
+
+    def mute(self, now_ns: int, known: LatestTelemetry) -> str:
+        """Return the report that it lacks although it is heard, or ""."""
+        if self.is_heard(now_ns, known):
+            return ""
+        if words := self._misfit.words(now_ns):
+            return words
+        # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
+        heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
+        return "it tells no velocity, as its own estimator knows none" if heard and known.moved_ns else ""
+
+    def homeward(self, now_ns: int, known: LatestTelemetry) -> str:
+        """Return the mode in which it flies home by itself, or ""."""
+        aloft = known.base_mode & ARMED and self.landed(now_ns, known) != Landed.ON_GROUND
+        home = aloft and flies_home(self._flavour, known.custom_mode)
+        return mode_name(self._flavour, known.custom_mode) if home else ""

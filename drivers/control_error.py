@@ -118,6 +118,9 @@ class ControlErrorMonitor:
         strays = self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported")
         strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
         strays = self._judge_climb(climb_m_s, up, dt_s) or strays
+        if view.foreign:  # others command it, but our limits hold
+            self.reset()
+            strays = ""
         speeds = [0.0 if reported is None else math.hypot(*reported)]
         speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
         return view._replace(speed_m_s=max(speeds), stray=strays, seen=seen_m_s is not None)

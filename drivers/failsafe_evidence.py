@@ -118,7 +118,8 @@ def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[
         holding[Condition.CROWDED] = vehicle.crowded
     if vehicle.speed_m_s > limits.tolerated_speed_m_s:
         allowed = f"{limits.max_speed_m_s:.1f} are allowed"
-        holding[Condition.TOO_FAST] = f"it flies {vehicle.speed_m_s:.1f} m/s, {allowed}"
+        condition = Condition.FLOWN_TOO_FAST if vehicle.foreign else Condition.TOO_FAST
+        holding[condition] = f"it flies {vehicle.speed_m_s:.1f} m/s, {allowed}"
 
 
 def timed(at: Situation, limits: WatchdogLimits) -> dict[Condition, float]:

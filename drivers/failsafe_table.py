@@ -60,6 +60,7 @@ class Condition(StrEnum):
     UNCONVERGED = auto()
     STRAYS = auto()
     TOO_FAST = auto()
+    FLOWN_TOO_FAST = auto()
     CROWDED = auto()
     ON_FLOOR = auto()
     FLIES_AWAY = auto()
@@ -172,6 +173,9 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.UNLOCATED, land, "no position {why}", limits.lost_land_s, modes=FREE),
         Failsafe(Condition.STRAYS, land, "it does not do what it is told: {why}", limits.stray_land_s, modes=FREE),
         Failsafe(Condition.TOO_FAST, land, "{why}", limits.fast_land_s, "", SLOWLY, modes=FREE),
+        # No order of ours but LAND brakes it, and that late: PX4 goes on for 7 m from 2.3 m/s.
+        Failsafe(Condition.FLOWN_TOO_FAST, land, "{why}, not by our orders", limits.fast_brake_s, "", SLOWLY,
+                 modes=FREE),
         # Hovering and tracking drones are moved apart: this is for when that fails.
         Failsafe(Condition.CROWDED, land, "{why}", limits.crowded_land_s, "", SLOWLY, modes=FREE),
         # A pilot has landed it, or it was pressed down: its controllers wind up until it notices its landing.

@@ -55,10 +55,10 @@ class WatchdogLimits:
     lands if no RESUME comes for so long (after a pause of the tracker: land_after_s). cut_s: it may fly on after an
     order to cut its motors. brake_s: hover before landing
     when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise explain while
-    at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s it needs a
-    RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
-    stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors are wrong and
-    no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
+    at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes (flown by others, lands), for
+    fast_resume_s it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands:
+    from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors
+    are wrong and no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
     crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
     by 0.1 m in that time. floor_land_s: likewise on the floor. away_told_s: for so long a landing vehicle rises or
     flies fast before that is told; a healthy one has braked from its take-off in half of it. sinks_m_s, landing_s: the
@@ -115,6 +115,7 @@ class VehicleView(NamedTuple):
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: the mode in which it flies home by itself, or "".
+    foreign: others fly it, so that its speed is judged, but not by its commands.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -139,6 +140,7 @@ class VehicleView(NamedTuple):
     height_m: float = 0.0
     away: str = ""
     homeward: str = ""
+    foreign: bool = False
 
     @property
     def plausible(self) -> "VehicleView":

@@ -74,6 +74,10 @@ class Orders:
         """Return whether the vehicle obeys our setpoints, not a pilot's or its own."""
         return custom_mode == self._guided and not self._mode.taken_over and not self.climbs_by_itself(now_ns)
 
+    def must_keep_limits(self, now_ns: int, custom_mode: int) -> bool:
+        """Return whether its speed is limited though our setpoints do not move it: nor do a pilot's sticks."""
+        return not (self.climbs_by_itself(now_ns) or self.pilot.moves(custom_mode))
+
     @property
     def yields(self) -> str:
         """Return why it is not ours to fly, "" while it is."""

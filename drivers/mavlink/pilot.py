@@ -1,10 +1,10 @@
-"""Judges whether a pilot lands a vehicle that we want to land: their sticks take precedence. Pure.
+"""Judges whether a pilot flies a vehicle, or lands one that we want to land: their sticks take precedence. Pure.
 
-Only modes that fly by sticks, without a position, count, and only while the vehicle receives a transmitter: in other
-modes there may be no pilot, and without our positions the vehicle would not hold its place.
+For a landing only modes that fly by sticks, without a position, count, and only while the vehicle receives a
+transmitter: in other modes there may be no pilot, and without our positions the vehicle would not hold its place.
 """
 
-from drivers.mavlink.wire.names import Flavour, flies_by_sticks
+from drivers.mavlink.wire.names import Flavour, flies_by_sticks, is_moved_by_sticks
 from groundstation.time_units import NS_PER_MS
 
 # A heartbeat may still name the mode that a landing has just ended.
@@ -23,6 +23,10 @@ class LandingPilot:
     def start_over(self) -> None:
         """Begin a new landing."""
         self._since_ns, self._told = None, False
+
+    def moves(self, custom_mode: int) -> bool:
+        """Return whether a pilot's sticks may be what moves it."""
+        return self.transmitter and is_moved_by_sticks(self._flavour, custom_mode)
 
     def lands(self, now_ns: int, custom_mode: int) -> bool:
         """Return whether a pilot flies it now."""

@@ -180,15 +180,17 @@ class MavlinkVehicle:
         """Return the vehicle's last reported state."""
         known = self.telemetry
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
-        velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(now_ns, known.custom_mode) else None
+        heeded = self.orders.are_heeded(now_ns, known.custom_mode)
+        limited = heeded or self.orders.must_keep_limits(now_ns, known.custom_mode)
         doubled = self._namesakes.words(now_ns, self._link.rejected.doubled(self.system))
         not_ready = doubled or self._readiness.why_not(now_ns, known)
         battery = known.batteries.charge(now_ns)
+        velocity = self._true_velocity(now_ns, known) if limited else None
         lost_s, mute = self.vision.lost_s(now_ns), self._flight.mute(now_ns, known)
         return VehicleView(
             self._flight.told(now_ns, known), self._flight.is_heard(now_ns, known), battery, not_ready,
             unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, unlocated=self.vision.missed, mute=mute,
-            homeward=self._flight.homeward(now_ns, known),
+            homeward=self._flight.homeward(now_ns, known), foreign=not heeded,
         )  # fmt: skip
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:

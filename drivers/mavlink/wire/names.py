@@ -158,10 +158,13 @@ class CopterMode(IntEnum):
     LOITER = 5
     RTL = 6
     LAND = 9
+    DRIFT = 11
+    SPORT = 13
     POSHOLD = 16
     BRAKE = 17
     GUIDED_NOGPS = 20
     SMART_RTL = 21
+    FLOWHOLD = 22
     AUTO_RTL = 27
 
 
@@ -202,6 +205,19 @@ _STICKS = {
 def flies_by_sticks(flavour: Flavour, custom_mode: int) -> bool:
     """Return whether a pilot's sticks alone fly it in a mode, without a position."""
     return custom_mode in _STICKS[flavour]
+
+
+_SLOW = 2  # sub-mode of POSITION
+_MOVED = {
+    Flavour.PX4: _STICKS[Flavour.PX4] | {px4_mode(Px4Main.POSITION), px4_mode(Px4Main.POSITION, _SLOW)},
+    Flavour.ARDUPILOT: _STICKS[Flavour.ARDUPILOT]
+    | {CopterMode.LOITER, CopterMode.DRIFT, CopterMode.SPORT, CopterMode.POSHOLD, CopterMode.FLOWHOLD},
+}
+
+
+def is_moved_by_sticks(flavour: Flavour, custom_mode: int) -> bool:
+    """Return whether only a pilot's sticks move it in a mode, by themselves or through its position."""
+    return custom_mode in _MOVED[flavour]
 
 
 def mode_name(flavour: Flavour, custom_mode: int) -> str:

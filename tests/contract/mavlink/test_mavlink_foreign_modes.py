@@ -25,6 +25,40 @@ def test_a_return_is_landed_at_once(rig_of, flavour, mode):
     rig.until(lambda: rig.mode == "LANDED", 15.0)
 
 
+_HOLDS = {Flavour.PX4: px4_mode(Px4Main.AUTO, Px4Auto.HOLD), Flavour.ARDUPILOT: CopterMode.AUTO}
+_PLACES = {Flavour.PX4: px4_mode(Px4Main.POSITION), Flavour.ARDUPILOT: CopterMode.POSHOLD}
+
+
+def moved_on(rig, mode, speed_m_s, transmitter=False):
+    """Have others fly it in a mode for 4 s; return whether it was landed."""
+    firmware = rig.emulator.firmware
+    rig.track_on()
+    firmware.transmitter = transmitter
+    rig.run(1.0)
+    firmware.enter(mode)
+    rig.run(1.1)
+    for _ in range(400):
+        if firmware.mode == mode:
+            rig.copter.fly((speed_m_s, 0.0, 0.0), 0.0)
+        rig.run(0.01)
+    return rig.mode == "LANDING" and firmware.mode == firmware.landing
+
+
+def test_a_vehicle_that_another_station_flies_fast_is_landed(rig):
+    assert moved_on(rig, _HOLDS[rig.flavour], 2.0)
+    assert "0.6 are allowed" in rig.host.watchdog.reason
+
+
+def test_one_that_another_station_flies_slowly_is_left_alone(rig):
+    assert not moved_on(rig, _HOLDS[rig.flavour], 0.5)
+    assert rig.mode == "TRACK"
+
+
+@pytest.mark.parametrize("transmitter", [True, False])
+def test_a_pilot_who_moves_it_by_sticks_may_be_fast_while_a_transmitter_is_heard(rig, transmitter):
+    assert moved_on(rig, _PLACES[rig.flavour], 2.0, transmitter) is not transmitter
+
+
 def test_a_return_on_the_floor_is_no_reason_to_land(rig):
     rig.connect()
     returns = CopterMode.RTL if rig.flavour is Flavour.ARDUPILOT else px4_mode(Px4Main.AUTO, Px4Auto.RETURN)

@@ -113,6 +113,14 @@ def test_nobody_is_judged_who_takes_off_lands_or_is_flown_by_a_pilot():
             assert judged.stray == "" and judged.speed_m_s == 0.0
 
 
+def test_of_a_vehicle_that_others_fly_only_the_speed_is_judged():
+    monitor = ControlErrorMonitor()
+    for turn in range(200):
+        flown = view(1.5)._replace(foreign=True)
+        judged = monitor.judge(round(turn * TURN_S * S), flown, told(), (1.0, 0.0))
+        assert judged.stray == "" and judged.speed_m_s == 1.5 and judged.seen
+
+
 def test_the_speed_is_the_faster_of_what_is_reported_and_seen():
     judged = ControlErrorMonitor().judge(S, view(0.3, 0.4), told(0.5), (1.5, 0.0))
     assert judged.speed_m_s == pytest.approx(1.3)

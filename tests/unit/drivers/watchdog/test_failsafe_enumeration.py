@@ -77,6 +77,7 @@ DEVIATIONS = {
     "it strays": always(0.1, 1.8, Condition.STRAYS, stray="1.2 m/s instead of 0.3 m/s"),
     "too fast": always(0.3, 1.8, Condition.TOO_FAST, speed=1.6),
     "too fast now and then": partly(0.3, 0.5, 3.0, 5.0, Condition.TOO_FAST, speed=1.6),
+    "flown too fast": always(0.3, 0.3, Condition.FLOWN_TOO_FAST, speed=1.6, foreign=True),
     "another too near": always(None, 2.2, Condition.CROWDED, crowded="drone_2 flies 0.41 m from it"),
     "another too near mostly": partly(0.8, 1.0, None, 4.5, Condition.CROWDED, crowded="drone_2 flies 0.41 m from it"),
     "down on the floor": always(0.5, 0.5, Condition.ON_FLOOR, on_floor=True),

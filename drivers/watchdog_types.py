@@ -58,7 +58,8 @@ class WatchdogLimits:
     at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes (flown by others, lands), for
     fast_resume_s it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands:
     from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors
-    are wrong and no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
+    are wrong and no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that
+    need one.
     crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
     by 0.1 m in that time. floor_land_s: likewise on the floor. away_told_s: for so long a landing vehicle rises or
     flies fast before that is told; a healthy one has braked from its take-off in half of it. sinks_m_s, landing_s: the

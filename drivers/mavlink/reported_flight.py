@@ -7,6 +7,10 @@ from drivers.mavlink.latest_telemetry import FRESH_NS, HEARTBEAT_NS, LatestTelem
 from drivers.mavlink.lift_off import credible
 from drivers.mavlink.wire.names import ARMED, Flavour, Landed, flies_home, mode_name
 from groundstation.bus.messages import FlightState
+from groundstation.time_units import NS_PER_S
+
+# A stream that was slowed down has come again by then.
+_ENDED_NS = NS_PER_S
 
 
 class ReportedFlight:
@@ -46,15 +50,18 @@ class ReportedFlight:
         newest = known.heard_ns if self.landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
         return known.heartbeat_ns > 0 and now_ns - newest < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
 
-    def mute(self, now_ns: int, known: LatestTelemetry) -> str:
-        """Return the report that it lacks although it is heard, or ""."""
+    def mute(self, now_ns: int, known: LatestTelemetry, slow: str) -> str:
+        """Return the report that it lacks although it is heard, or ""; slow: the stream that comes seldom."""
         if self.is_heard(now_ns, known):
             return ""
         if words := self._misfit.words(now_ns):
             return words
         # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
         heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
-        return "it tells no velocity, as its own estimator knows none" if heard and known.moved_ns else ""
+        if not heard or not known.moved_ns:
+            return ""
+        ended = now_ns - known.moved_ns > _ENDED_NS
+        return slow or ("it tells no velocity, as its own estimator knows none" if ended else "its velocity stays away")
 
     def homeward(self, now_ns: int, known: LatestTelemetry) -> str:
         """Return the mode in which it flies home by itself, or ""."""

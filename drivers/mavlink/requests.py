@@ -39,6 +39,10 @@ class Requests:
             return
         self._open[key] = _Open(command_to(self._system, command, *params), now_ns)
 
+    def is_open(self, key: str) -> bool:
+        """Return whether a request is in progress."""
+        return key in self._open
+
     def drop(self, *keys: str) -> None:
         """Drop requests: a landing must not be followed by a late order to climb."""
         for key in keys:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import GlobalOrigin
+from drivers.mavlink.stream_rates import StreamRates
 from drivers.mavlink.wire import service, telemetry
 from drivers.mavlink.wire.flight import OdometryMessage, command_to
 from drivers.mavlink.wire.frames import Message, id_of
@@ -27,6 +28,7 @@ _HEARTBEAT_NS = 250 * NS_PER_MS
 _DISCONNECTED_NS = 2 * NS_PER_S
 # Least time without a stream before it is requested again, in periods of its own.
 _STREAM_NS, _PERIODS = 3 * NS_PER_S, 5
+_SLOW_TOLD_NS = 30 * NS_PER_S
 _PARAM_BURST = 4
 _PARAM_TRIES = 20
 _ORIGIN_TRIES_PX4 = 5
@@ -88,6 +90,9 @@ class MavlinkSession:
         self._doubted: set[str] = set()
         self._param_tries: Counter[str] = Counter()
         self._stream_ns: dict[type[Message], int] = {}  # time of its last arrival or request
+        self._rates_found = StreamRates(rates)
+        self._again: list[type[Message]] = []
+        self._slow_told_ns = -NEVER_NS
         self._has_origin = False
         self._origin_tries = 0
         self._next_origin_ns = self._next_param_ns = self._next_heartbeat_ns = 0
@@ -145,6 +150,12 @@ class MavlinkSession:
         """Note that a message of a kind arrived; called on the reader's thread."""
         if kind in self._rates:
             self._stream_ns[kind] = now_ns
+            self._rates_found.take(kind)
+
+    @property
+    def slow(self) -> str:
+        """Return which stream comes more seldom than it was granted, or ""."""
+        return self._rates_found.words
 
     def start_over(self, requests: Requests) -> None:
         """Forget requests and answers, for a vehicle that was silent or restarted."""
@@ -155,6 +166,8 @@ class MavlinkSession:
         self._comparison = None
         self._param_tries.clear()
         self._stream_ns.clear()
+        self._rates_found.start_over()
+        self._again = []
         self._version, self._version_tries, self._serial_number = None, 0, ""
         requests.forget()
 
@@ -213,7 +226,8 @@ class MavlinkSession:
             return messages
         self._connected, self._advice = True, ""
         kind = next((one for one in self._rates if self._key(one) not in requests.accepted), None)
-        if (kind := kind or self._ended(now_ns)) is not None:
+        self._note_slow(now_ns)
+        if (kind := kind or self._ended(now_ns) or self._next_slow(requests)) is not None:
             # WIRE (SET_MESSAGE_INTERVAL): microseconds; -1 stops the stream.
             interval_us = 1e6 / rate_hz if (rate_hz := self._rates[kind]) > 0.0 else -1.0
             requests.ask(now_ns, self._key(kind), MavCmd.SET_MESSAGE_INTERVAL, float(id_of(kind)), interval_us)
@@ -227,6 +241,16 @@ class MavlinkSession:
             if now_ns - self._stream_ns.get(kind, now_ns) > patience_ns:
                 return kind
         return None
+
+    def _note_slow(self, now_ns: int) -> None:
+        self._again += self._rates_found.step(now_ns)
+        if self.slow and now_ns - self._slow_told_ns > _SLOW_TOLD_NS:
+            self._slow_told_ns = now_ns
+            self.notes.append(f"{self.slow}: another station changed its rates, or the link carries no more")
+
+    def _next_slow(self, requests: Requests) -> type[Message] | None:
+        ready = bool(self._again) and not any(requests.is_open(self._key(kind)) for kind in self._rates)
+        return self._again.pop(0) if ready else None
 
     def _service(self, now_ns: int) -> list[Message]:
         messages: list[Message] = []

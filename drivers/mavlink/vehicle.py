@@ -186,7 +186,7 @@ class MavlinkVehicle:
         not_ready = doubled or self._readiness.why_not(now_ns, known)
         battery = known.batteries.charge(now_ns)
         velocity = self._true_velocity(now_ns, known) if limited else None
-        lost_s, mute = self.vision.lost_s(now_ns), self._flight.mute(now_ns, known)
+        lost_s, mute = self.vision.lost_s(now_ns), self._flight.mute(now_ns, known, self._session.slow)
         return VehicleView(
             self._flight.told(now_ns, known), self._flight.is_heard(now_ns, known), battery, not_ready,
             unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, unlocated=self.vision.missed, mute=mute,

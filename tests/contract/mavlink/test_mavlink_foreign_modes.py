@@ -2,9 +2,13 @@
 
 import pytest
 
-from drivers.mavlink.wire.names import CopterMode, Flavour, Px4Auto, Px4Main, px4_mode
+from drivers.mavlink.wire.flight import command_to
+from drivers.mavlink.wire.frames import FrameEncoder, id_of
+from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+from drivers.mavlink.wire.telemetry import AttitudeQuaternion, LocalPositionNed
 from groundstation.bus.messages import Verb
 
+GROUND = ("127.0.0.1", 14999)
 _RETURNS = [
     ("px4", px4_mode(Px4Main.AUTO, Px4Auto.RETURN)),
     ("ardupilot", CopterMode.RTL),
@@ -65,3 +69,16 @@ def test_a_return_on_the_floor_is_no_reason_to_land(rig):
     rig.emulator.firmware.enter(returns)
     rig.run(2.0)
     assert rig.mode == "LANDED"
+
+
+def test_streams_that_another_station_slowed_down_come_again_in_time(rig):
+    rig.track_on()
+    rig.run(3.0)
+    for kind in (LocalPositionNed, AttitudeQuaternion):
+        ask = command_to(11, MavCmd.SET_MESSAGE_INTERVAL, float(id_of(kind)), 500_000.0)
+        rig.emulator.take(FrameEncoder(250, 190).encode(ask), GROUND)
+    rig.run(1.5)
+    assert rig.host.watchdog.vehicle.silence != "it tells no velocity, as its own estimator knows none"
+    rig.run(3.0)
+    assert rig.mode == "TRACK" and rig.host.watchdog.vehicle.fresh
+    assert sum("its velocity comes at 2 of 50 Hz: another station" in text for text in rig.texts) == 1

@@ -115,6 +115,7 @@ class Orders:
         if action is Action.FLY and decision.entered_ns != self._ordered_ns:
             self._ordered_ns = decision.entered_ns  # TRACK or RESUME; returning setpoints are no order
             self._mode.take_back(now_ns)
+            self._end_pause(now_ns, guided)
         if self._mode.is_lost(now_ns, guided, armed and action in (Action.FLY, Action.HOVER)):
             self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
         own_climb = action is Action.TAKE_OFF and self._flavour is Flavour.ARDUPILOT
@@ -177,7 +178,7 @@ class Orders:
         else:
             self.starting, self._climb_until_ns = False, now_ns + _CLIMB_LIMIT_NS
         if action in (Action.LAND, Action.CUT, Action.IDLE):
-            self._requests.drop("arming", KEY, "take-off")
+            self._requests.drop("arming", KEY, "take-off", "going on")
         if action is Action.LAND:
             self._requests.accepted.discard("landing")
         self._action, self._since_ns = action, now_ns
@@ -185,6 +186,11 @@ class Orders:
     def _yield(self, now_ns: int, why: str) -> None:
         self._mode.taken_over, self._why = True, f"it {why}: not ours to fly until RESUME"
         self.events.append((MavSeverity.WARNING, self._why + self.said.of(self._mode.guided_ns, now_ns)))
+
+    def _end_pause(self, now_ns: int, guided: bool) -> None:
+        # WIRE (ArduCopter 4.7, DO_PAUSE_CONTINUE): paused by another station it stays GUIDED, deaf to velocities.
+        if guided and self._flavour is Flavour.ARDUPILOT:
+            self._ask(now_ns, "going on", MavCmd.DO_PAUSE_CONTINUE, 1.0)
 
     def _land(
         self, now_ns: int, decision: WatchdogDecision, armed: bool, guided: bool, custom_mode: int

@@ -82,3 +82,17 @@ def test_streams_that_another_station_slowed_down_come_again_in_time(rig):
     rig.run(3.0)
     assert rig.mode == "TRACK" and rig.host.watchdog.vehicle.fresh
     assert sum("its velocity comes at 2 of 50 Hz: another station" in text for text in rig.texts) == 1
+
+
+def test_a_resume_ends_the_pause_of_another_station(rig_of):
+    rig = rig_of("ardupilot")
+    rig.wanted = ((0.3, 0.0, 0.0), 0.0)
+    rig.track_on()
+    rig.run(3.0)
+    rig.emulator.firmware.pause(goes_on=False)
+    rig.until(lambda: "does not do what it is told" in rig.host.watchdog.reason, 9.0)
+    rig.run(1.0)
+    rig.order(Verb.RESUME)
+    rig.run(1.5)
+    assert rig.mean_velocity(2.0)[0] == pytest.approx(0.3, abs=0.1)
+    assert rig.mode == "TRACK"

@@ -39,6 +39,7 @@ _STILL: Vector3 = (0.0, 0.0, 0.0)
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
 # Below this speed a climb that HOLD ended is over; one that has just begun speeds up until the vehicle obeys.
 _STOPPED_M_S, _OBEYS_NS = 0.1, 500 * NS_PER_MS
+_OWN_START_NS = 3 * NS_PER_S  # a start of our own that was broken off is told by then
 
 
 def _sideways(back_m_s: Vector3 | None) -> tuple[float, float] | None:
@@ -139,6 +140,8 @@ class Orders:
             case Action.IDLE:
                 if armed and landed == Landed.ON_GROUND:
                     self._ask(now_ns, "disarming", MavCmd.COMPONENT_ARM_DISARM, 0.0, 0.0)
+                if self._motors.started and now_ns - self._since_ns > _OWN_START_NS:
+                    self.events.append((MavSeverity.INFO, "its motors were started, not by us: it is disarmed"))
             case Action.WAIT:
                 pass
         return None
@@ -191,6 +194,7 @@ class Orders:
         # WIRE (ArduCopter 4.7, DO_PAUSE_CONTINUE): paused by another station it stays GUIDED, deaf to velocities.
         if guided and self._flavour is Flavour.ARDUPILOT:
             self._ask(now_ns, "going on", MavCmd.DO_PAUSE_CONTINUE, 1.0)
+            self.drift.forget_undershoot()  # learnt from a deaf vehicle
 
     def _land(
         self, now_ns: int, decision: WatchdogDecision, armed: bool, guided: bool, custom_mode: int

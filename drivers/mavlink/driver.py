@@ -105,6 +105,8 @@ class Fleet:
                 vehicle.misfit.take_stranger(heard.stamp_ns, heard.frame.system)
             if self.strangers[heard.frame.system] == 1:
                 text = f"system {heard.frame.system} answers, which is not in the field file"
+                if silent := [v.name for v in self.vehicles.values() if v.telemetry.fell_silent(heard.stamp_ns)]:
+                    text += f", since {' and '.join(silent)} fell silent: was a system id changed?"
                 self._news.append((text, "see system_id in the field file"))
 
     def turn(self, now_ns: int) -> None:

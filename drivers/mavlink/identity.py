@@ -3,8 +3,10 @@
 from drivers.mavlink.latest_telemetry import HEARTBEAT_NS
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AutopilotVersion
-from groundstation.time_units import NEVER_NS
+from groundstation.time_units import NEVER_NS, NS_PER_MS
 
+# More than a second, in which a heartbeat is due.
+_SILENT_NS = 1_200 * NS_PER_MS
 _WORDS = {Flavour.PX4: "a PX4", Flavour.ARDUPILOT: "an ArduPilot"}
 
 
@@ -51,11 +53,12 @@ class Misfit:
         self._flavour, self._system = flavour, system
         self._told: tuple[int, str] | None = None
         self._stranger: tuple[int, int] | None = None
-        self._heard = False
+        self._strangers: dict[int, int] = {}  # when each was heard first
+        self._heard_ns: int | None = None
 
     def take(self, now_ns: int, autopilot: int) -> str:
         """Take a heartbeat; return that it is another kind than the field file says, with the remedy, or ""."""
-        self._told, self._heard = (now_ns, other_flavour(autopilot, self._flavour)), True
+        self._told, self._heard_ns = (now_ns, other_flavour(autopilot, self._flavour)), now_ns
         return self._told[1]
 
     def take_old(self, now_ns: int) -> None:
@@ -65,13 +68,18 @@ class Misfit:
 
     def take_stranger(self, now_ns: int, system: int) -> None:
         """Take a heartbeat of an autopilot of this link whose system id the field file does not have."""
-        if not self._heard:  # one that was heard has the id of the field
+        first_ns = self._strangers.setdefault(system, now_ns)
+        if self._heard_ns is None or first_ns > self._heard_ns:  # one that was there already is another vehicle
             self._stranger = now_ns, system
 
     def words(self, now_ns: int) -> str:
         """Return the reason, "" if there is none."""
-        if self._told is not None and now_ns - self._told[0] < HEARTBEAT_NS:
+        if self._told is not None and now_ns - self._told[0] < HEARTBEAT_NS and (self._told[1] or not self._stranger):
             return self._told[1]
-        if self._stranger is None or self._heard or now_ns - self._stranger[0] >= HEARTBEAT_NS:
+        if self._stranger is None or now_ns - self._stranger[0] >= HEARTBEAT_NS:
             return ""
+        if self._heard_ns is not None:
+            silent = self._strangers[self._stranger[1]] > self._heard_ns and now_ns - self._heard_ns > _SILENT_NS
+            changed = f"system {self._stranger[1]} answers since it fell silent: was its system id changed?"
+            return changed if silent else ""
         return f"system {self._stranger[1]} answers here, the field says {self._system}: set mavlink.system_id"

@@ -12,15 +12,15 @@ _FELL_NS = 1_300 * NS_PER_MS
 
 
 class Motors:
-    """Watches the motors of one vehicle."""
+    """Watches the motors of one vehicle; started: since the last look."""
 
     def __init__(self) -> None:
-        self._turned = False
+        self.started = self._turned = False
         self._aloft_ns: int | None = None
 
     def stop_aloft(self, now_ns: int, turn: bool, height_m: float) -> bool:
         """Return, once, that they have stopped although it was in the air a moment ago; height_m: above the floor."""
-        stopped, self._turned = self._turned and not turn, turn
+        stopped, self.started, self._turned = self._turned and not turn, turn and not self._turned, turn
         if height_m > _ALOFT_M:
             self._aloft_ns = now_ns
         return stopped and self._aloft_ns is not None and now_ns - self._aloft_ns < _FELL_NS

@@ -25,7 +25,7 @@ from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, MavSeverity, SensorBits
 from drivers.plausibility.health import Health
 from drivers.plausibility.motion import MotionMonitor
-from drivers.watchdog_types import VehicleView, WatchdogDecision
+from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, Vector3
@@ -207,7 +207,10 @@ class MavlinkVehicle:
             self._boot_clock.restarted = False
             self._session.start_over(self._requests)  # origin and parameters were lost, though it was hardly silent
             self.orders.start_failed(now_ns)
-        messages = self._session.step(now_ns, silence_ns, self._requests)
+        # Others on its line get heartbeats of their own: theirs reach it too, and keep it up.
+        lands = decision.mode is DriverMode.LANDING and decision.action is Action.LAND
+        deaf = lands and not self.orders.pilot.moves(known.custom_mode)
+        messages = self._session.step(now_ns, silence_ns, self._requests, deaf)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
         landed = self._flight.landed(now_ns, known)

@@ -16,10 +16,11 @@ ESTIMATOR_VISION = 2
 
 
 class MavSeverity(IntEnum):
-    """MAV_SEVERITY: 0 emergency .. 7 debug; the two limits for texts reported to the operator."""
+    """MAV_SEVERITY: 0 emergency .. 7 debug; limits of what the operator reads as an error and a warning."""
 
     ERROR = 3
     WARNING = 4
+    INFO = 6
 
 
 class Flavour(IntEnum):

@@ -2,10 +2,10 @@
 
 import pytest
 
-from drivers.mavlink.wire.flight import command_to
+from drivers.mavlink.wire.flight import VisionPositionEstimate, command_to
 from drivers.mavlink.wire.frames import FrameEncoder, id_of
 from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
-from drivers.mavlink.wire.telemetry import AttitudeQuaternion, LocalPositionNed
+from drivers.mavlink.wire.telemetry import AttitudeQuaternion, Heartbeat, LocalPositionNed
 from groundstation.bus.messages import Verb
 
 GROUND = ("127.0.0.1", 14999)
@@ -96,3 +96,40 @@ def test_a_resume_ends_the_pause_of_another_station(rig_of):
     rig.run(1.5)
     assert rig.mean_velocity(2.0)[0] == pytest.approx(0.3, abs=0.1)
     assert rig.mode == "TRACK"
+
+
+def test_motors_that_somebody_else_starts_are_stopped_and_told(rig):
+    rig.connect()
+    rig.run(4.0)
+    assert not any("its motors were started" in text for text in rig.texts)
+    rig.emulator.firmware.arm(True)
+    rig.run(3.0)
+    assert not rig.emulator.firmware.armed
+    assert sum("its motors were started, not by us" in text for text in rig.texts) == 1
+
+
+def test_our_own_starts_are_not_told_as_anothers(rig):
+    rig.take_off()
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.mode == "LANDED", 15.0)
+    rig.run(4.0)
+    assert not any("its motors were started" in text for text in rig.texts)
+
+
+@pytest.mark.parametrize("pilot", [False, True])
+def test_a_deaf_and_silent_ardupilot_gets_no_heartbeats_and_so_lands_by_itself(rig_of, pilot):
+    """As one whose system id was changed: it hears heartbeats, which are for all, but no order."""
+    rig = rig_of("ardupilot")
+    firmware, send = rig.emulator.firmware, rig.link.send
+    rig.track_on()
+    if pilot:
+        firmware.transmitter = True
+        rig.run(1.0)
+        firmware.enter(CopterMode.ALT_HOLD)
+        rig.run(1.5)
+    rig.link.receive = lambda: rig.link.lose() or []
+    heard = (Heartbeat, VisionPositionEstimate)
+    rig.link.send = lambda system, message: send(system, message) if isinstance(message, heard) else None
+    rig.run(8.0)
+    assert rig.mode == "LANDING"
+    assert (firmware.mode == firmware.landing) is not pilot

@@ -7,6 +7,7 @@ velocity. Our own loop sends: when it stands still, nothing is sent and the vehi
 
 from collections import deque
 
+from drivers.failsafe_table import Condition
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.lift_off import LiftOff
@@ -120,7 +121,7 @@ class Orders:
         if self._mode.is_lost(now_ns, guided, armed and action in (Action.FLY, Action.HOVER)):
             self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
         own_climb = action is Action.TAKE_OFF and self._flavour is Flavour.ARDUPILOT
-        if own_climb or not self.are_heeded(now_ns, custom_mode):
+        if own_climb or decision.failsafe == Condition.STRAYS or not self.are_heeded(now_ns, custom_mode):
             self.drift.forget_undershoot()
         match action:
             case Action.TAKE_OFF:
@@ -194,7 +195,6 @@ class Orders:
         # WIRE (ArduCopter 4.7, DO_PAUSE_CONTINUE): paused by another station it stays GUIDED, deaf to velocities.
         if guided and self._flavour is Flavour.ARDUPILOT:
             self._ask(now_ns, "going on", MavCmd.DO_PAUSE_CONTINUE, 1.0)
-            self.drift.forget_undershoot()  # learnt from a deaf vehicle
 
     def _land(
         self, now_ns: int, decision: WatchdogDecision, armed: bool, guided: bool, custom_mode: int

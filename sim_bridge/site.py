@@ -135,6 +135,7 @@ class SiteCamera(_Part):
     position_std_m: float = 0.0
     looking: Literal["down"] = "down"
     rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    observes: tuple[str, ...] = ("robots",)
 
 
 class SiteBody(_Part):

@@ -80,7 +80,7 @@ def _hidden(world: World, carried: Carried, state: Array, eye: Array) -> bool:
 
 
 class Eye:
-    """One camera, on a drone or in the world; it observes all boards but its carrier's own.
+    """One camera. On a drone it observes all boards but its carrier's own, in the world those of its settings.
 
     outliers: share of sightings with a gross error, besides the scenario's. Mounting and lens are a little off
     the field's figures, unless the scenario says otherwise.
@@ -105,10 +105,9 @@ class Eye:
         standing_px = _HALVED_PX if lens.intrinsics.width_px > HALVE_ABOVE_PX else _STANDING_PX
         self._search_px = standing_px if self._carrier is None else _TURNING_PX
         self._told_lens, self._lens = lens.intrinsics, true_lens(lens, cameras.mounting_errors, rng)
-        fixed = self._carrier is None
-        self._boards = tuple(
-            b for b in boards_of(site) if b.body != self._carrier and (b.body in site.drones or not fixed)
-        )
+        observed = ("robots", "targets") if isinstance(mount, SiteDrone) else mount.observes
+        bodies = {*(site.drones if "robots" in observed else ()), *(site.tracked if "targets" in observed else ())}
+        self._boards = tuple(b for b in boards_of(site) if b.body in bodies - {self._carrier})
         self._scenario, self._outliers, self._rng = cameras, outliers, rng
         self._last_seen = {b.body: -math.inf for b in self._boards}
         self._seq = 0

@@ -32,8 +32,8 @@ def faults(
 
     At message level: no processes, no pictures. Each seed is one flight, and always ends in the same way. Unsafe are,
     from the first lift-off on: a separation below 0.6 m; a drone outside the fence, within 0.3 m of an obstacle of the
-    field, 0.3 m/s above its speed limit, or in motion for more than a second with a belief that is 0.5 m off; and, once
-    a vehicle's telemetry is useless, no hover within 1 s or no rest within 3.5 s.
+    field, 0.3 m/s above its speed limit, falling, or in motion for more than a second with a belief that is 0.5 m off;
+    and, once a vehicle's telemetry is useless, no hover within 1 s, no rest within 3.5 s, or motion after it.
     """
     from groundstation.experiments.faults import by_kind, ends_told, table, totals
     from groundstation.experiments.flight_batches import batches, flights_of

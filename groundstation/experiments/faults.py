@@ -20,8 +20,9 @@ def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return one row for each kind of fault, then one for flights with none; a flight with two faults counts in both.
 
     flights: number that lifted off, which are judged; not_flown: number whose team did not all take off, and so never
-    tracked; unsafe: number that ended so, alone: those with this fault only; worst figures; why: how often each bound
-    was broken first; seeds: of unsafe ends, those with this fault only first.
+    tracked; unsafe: number that ended so, alone: those with this fault only; stops_due, stops_judged: faults of the
+    kind that demand a stop, and those whose stop was judged; worst figures; why: how often each bound was broken first;
+    seeds: of unsafe ends, those with this fault only first.
     """
     rows = []
     kinds = sorted({kind for flight in flights for kind in flight["kinds"]})
@@ -44,12 +45,18 @@ def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "alone": sum(len(f["faults"]) == 1 for f in flown),
                 "unsafe_alone": sum(len(f["faults"]) == 1 for f in unsafe),
                 "stopped": sum(any(mode != "TRACK" for mode in f["modes"].values()) for f in mine if _tracked(f)),
+                **_stops([fault for f in flown for fault in f["faults"] if fault["kind"] == kind]),
                 **{key: worst(flown, key, pick) for key, pick in _WORST},
                 "why": dict(sorted(why.items(), key=lambda item: -item[1])),
                 "seeds": [f["seed"] for f in unsafe],
             }
         )
     return rows
+
+
+def _stops(faults: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    due = [fault["stop_judged"] for fault in faults if fault["stop_judged"] is not None]
+    return {"stops_due": len(due), "stops_judged": sum(due)}
 
 
 def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, float]]) -> dict[str, Any]:
@@ -62,6 +69,7 @@ def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, f
     return {
         "flights": len(flown),
         "unsafe": sum(bool(flight["unsafe"]) for flight in flown),
+        **_stops([fault for flight in flown for fault in flight["faults"]]),
         "unreached": [f["seed"] for f in flown if f["unsafe"] and set(f["unsafe"]) == set(f["unreached"])],
         "deaf": _deaf([spell for flight in flown for spell in flight["deaf"]]),
         "not_flown": [flight["seed"] for flight in flights if not _tracked(flight)],
@@ -93,6 +101,11 @@ def ends_told(summary: Mapping[str, Any]) -> list[str]:
         f"{summary['unsafe']} of {summary['flights']} flights ended unsafe; healthy flights stopped: "
         f"{summary['false_alarms'] or 'none'}; did not all take off: {summary['not_flown'] or 'none'}"
     ]
+    if unjudged := summary["stops_due"] - summary["stops_judged"]:
+        lines.append(
+            f"  {unjudged} of {summary['stops_due']} faults that demand a stop were not judged by it: they never "
+            "showed, or not for long enough"
+        )
     if unreached := summary["unreached"]:
         lines.append(
             f"  in {len(unreached)} of the unsafe ones a drone heard nothing, and nothing else had gone wrong: nobody "
@@ -108,17 +121,18 @@ def ends_told(summary: Mapping[str, Any]) -> list[str]:
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the rows as lines of text."""
-    heads = ("fault", "flights", "unsafe", "alone", "sep m", "fence m", "m/s", "lost s", "hover s", "rest s")
-    head = "{:18s} {:>7s} {:>6s} {:>7s} {:>6s} {:>7s} {:>5s} {:>6s} {:>7s} {:>6s}".format(*heads)
+    heads = ("fault", "flights", "unsafe", "alone", "sep m", "fence m", "m/s", "lost s", "stops judged",
+             "hover s", "rest s")  # fmt: skip
+    columns = "{:18s} {:>7s} {:>6s} {:>7s} {:>6s} {:>7s} {:>5s} {:>6s} {:>12s} {:>7s} {:>6s}"
+    head = columns.format(*heads)
     lines = [f"{head}  first broken; seeds"]
     for row in rows:
         figures = [f"{row[key]:.2f}" if row[key] is not None else "-" for key, _ in _WORST]
         alone = f"{row['unsafe_alone']}/{row['alone']}"
+        stops = f"{row['stops_judged']}/{row['stops_due']}" if row["stops_due"] else "-"
         why = ", ".join(f"{what} {count}" for what, count in row["why"].items())
         seeds = " ".join(map(str, row["seeds"][:_SHOWN_SEEDS])) + (" ..." if len(row["seeds"]) > _SHOWN_SEEDS else "")
-        lines.append(
-            "{:18s} {:7d} {:6d} {:>7s} {:>6s} {:>7s} {:>5s} {:>6s} {:>7s} {:>6s}  {}".format(
-                row["kind"], row["flights"], row["unsafe"], alone, *figures, f"{why}; {seeds}" if why else ""
-            )
-        )
+        counts = (row["kind"], str(row["flights"]), str(row["unsafe"]), alone)
+        line = columns.format(*counts, *figures[:-2], stops, *figures[-2:])
+        lines.append(f"{line}  {why}; {seeds}" if why else f"{line}  ")
     return lines

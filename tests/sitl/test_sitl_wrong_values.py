@@ -48,7 +48,7 @@ def test_a_drone_with_wrong_values_stops_in_time(
     assert verdict["unsafe"] == {}, verdict
     # A drone that hardly moved when the fault began is stopped before its motion could show it.
     stopped = verdict["modes"].get(wrong.entity, "TRACK") != "TRACK"
-    assert stopped or verdict["hover_s"] + verdict["rest_s"] > 0.0, "the fault never showed, or nobody moved"
+    assert stopped or verdict["hover_s"] or verdict["rest_s"], "the fault never showed, or nobody moved"
 
 
 @pytest.mark.parametrize("wrong", BORNE.values(), ids=BORNE)

@@ -47,6 +47,8 @@ _DETECTOR_MS = (10.0, 50.0)
 _JUDGE_TICKS = 10
 JUDGE_S = _JUDGE_TICKS * TICK_NS / 1e9
 _ORDER_TICKS = 20
+# Modes of a driver whose drone no longer flies, or comes down: CUT, too, of which it falls.
+DOWN = frozenset({"LANDING", "LANDED", "CUT"})
 # Deadline for the team to track: AR.Drones take 8 s, MAVLink vehicles longer.
 TRACKING_BY_S = 30.0
 
@@ -229,6 +231,10 @@ class FaultFlight:
         """Return the scenario with its faults."""
         return self._drawn.scenario
 
+    def modes(self) -> dict[str, str]:
+        """Return the mode of each drone's driver."""
+        return {name: str(host.watchdog.mode) for name, host in self.drivers.hosts.items()}
+
     def believed(self, name: str) -> Array | None:
         """Return the believed place of a body [x, y in m]; None if unknown."""
         belief = self.tracking.tracker.belief
@@ -247,7 +253,6 @@ class FaultFlight:
     def _report(self) -> dict[str, Any]:
         faults = self._drawn.scenario.faults
         observable = tuple(self._observable(fault) for fault in faults)
-        modes = {name: str(host.watchdog.mode) for name, host in self.drivers.hosts.items()}
         reasons = {name: host.watchdog.reason for name, host in self.drivers.hosts.items()}
         verdict = self.judge.verdict(faults, observable) if self._lifted_off else {}
         return {
@@ -255,15 +260,17 @@ class FaultFlight:
             "kinds": sorted(str(fault.kind) for fault in faults),
             "faults": [
                 {
+                    "kind": str(fault.kind),
                     "what": described(fault),
                     "start_s": round(fault.start_s, 2),
                     "end_s": fault.end_s,
                     "observable_s": at_s,
+                    "stop_judged": self.judge.stop_judged(fault, at_s),
                 }
                 for fault, at_s in zip(faults, observable, strict=True)
             ],
             "tracking_since_s": self.tracking_since_s,
-            "modes": modes,
+            "modes": self.modes(),
             "reasons": reasons,
             "planning": self.planning.failed,
             **verdict,

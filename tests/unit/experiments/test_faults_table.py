@@ -17,9 +17,10 @@ from groundstation.experiments.flight_batches import CampaignError, FlightBatch,
 
 
 def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "TRACK", **more: Any) -> dict[str, Any]:
+    faults = [{"kind": kind, "stop_judged": True if kind == "velocity_stuck" else None} for kind in kinds]
     return {
-        "seed": seed, "kinds": kinds, "faults": [{}] * len(kinds), "tracking_since_s": 6.0, "modes": {"a": mode},
-        "separation_m": 1.0, "fence_m": 0.0, "speed_m_s": 0.5, "unlocalised_s": 0.0, "hover_s": 0.0, "rest_s": 0.0,
+        "seed": seed, "kinds": kinds, "faults": faults, "tracking_since_s": 6.0, "modes": {"a": mode},
+        "separation_m": 1.0, "fence_m": 0.0, "speed_m_s": 0.5, "unlocalised_s": 0.0, "hover_s": None, "rest_s": None,
         "unsafe": unsafe, "unreached": [], "deaf": [],
     } | more  # fmt: skip
 
@@ -27,7 +28,7 @@ def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "T
 FLIGHTS = [
     flight(1, ["wind"], {}),
     flight(2, ["velocity_stuck", "wind"], {"speed": 12.0, "fence": 13.0}, separation_m=0.4),
-    flight(3, ["velocity_stuck"], {"hover": 11.0}, "LANDED", hover_s=2.5),
+    flight(3, ["velocity_stuck"], {"hover": 11.0}, "LANDED", hover_s=2.5, rest_s=3.0),
     flight(4, [], {}),
     flight(5, [], {}, "LANDED"),
     {"seed": 6, "kinds": ["wind"], "faults": [{}], "tracking_since_s": None, "modes": {"a": "LANDED"}},
@@ -48,6 +49,18 @@ def test_the_table_counts_by_kind_and_names_seeds() -> None:
     assert (healthy["flights"], healthy["not_flown"], healthy["unsafe"], healthy["stopped"]) == (1, 1, 1, 0)
     text = "\n".join(table(list(rows.values())))
     assert "velocity_stuck" in text and "hover 1, speed 1; 3 2" in text
+
+
+def test_stops_that_were_not_judged_are_told_from_perfect_ones() -> None:
+    unjudged = flight(8, ["velocity_stuck"], {}, faults=[{"kind": "velocity_stuck", "stop_judged": False}])
+    rows = {row["kind"]: row for row in by_kind([*FLIGHTS, unjudged])}
+    stuck, wind = rows["velocity_stuck"], rows["wind"]
+    assert (stuck["stops_judged"], stuck["stops_due"], wind["stops_due"]) == (2, 3, 0)
+    head, wind_line, stuck_line, _ = (line.split() for line in table([wind, stuck, rows[HEALTHY]]))
+    assert head[11:17] == ["stops", "judged", "hover", "s", "rest", "s"]
+    assert wind_line[8:11] == ["-", "-", "-"], "not 0.00 s: nobody had to stop"
+    assert stuck_line[8:11] == ["2/3", "2.50", "3.00"]
+    assert "  1 of 3 faults that demand a stop were not judged by it" in ends_told(totals([*FLIGHTS, unjudged], []))[1]
 
 
 def test_totals_name_false_alarms_and_where_time_goes() -> None:

@@ -61,4 +61,4 @@ class ScenarioExpectation(Section):
     found_s: Annotated[float, Field(ge=0, le=3600)] | None = None
     """Latest time at which the target is found [s after the team tracks]; none: any."""
     landings: Annotated[int, Field(ge=0, le=99)] = 0
-    """How many drones may land."""
+    """How many drones may land, or have their motors stopped."""

@@ -6,7 +6,7 @@ from typing import Any
 from groundstation.experiments.summary import worst
 
 _WORST = (("separation_m", min), ("fence_m", max), ("obstacle_m", min), ("unlocalised_s", max))
-_BOUNDS = ("fence", "obstacle", "separation")
+_BOUNDS = ("fence", "obstacle", "separation", "fell")
 _SHOWN_SEEDS = 8
 
 
@@ -14,9 +14,9 @@ def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row each for flights in which nothing is wrong, sightings state too little, or velocities are off.
 
     flights: number that tracked; not_flown: seeds whose team did not all take off; drones: sizes of the teams that
-    tracked; violations: seeds that left the fence, or came too near to each other or an obstacle, with the time
-    [s]; landed_before: seeds in which a
-    drone landed without the order; not_landed: seeds in which one still flew at the end.
+    tracked; violations: seeds that left the fence, came too near to each other or an obstacle, or fell, with the time
+    [s]; landed_before: seeds in which a drone came down without the order; not_landed: seeds in which one still
+    flew at the end.
     """
     rows = []
     for share, drift_m_s in sorted({_wrong(flight) for flight in flights}, key=lambda wrong: (-wrong[0], wrong[1])):

@@ -15,8 +15,8 @@ from sim_bridge.study.missions.flight import MissionFlight
 class Boasting(MissionFlight):
     """A mission whose drivers say at any time that they have landed."""
 
-    def _modes(self) -> dict[str, str]:
-        return dict.fromkeys(super()._modes(), "LANDED")
+    def modes(self) -> dict[str, str]:
+        return dict.fromkeys(super().modes(), "LANDED")
 
 
 def mission(kind: type[MissionFlight], seconds: float) -> MissionFlight:

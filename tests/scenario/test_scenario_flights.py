@@ -5,6 +5,7 @@ import math
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -18,11 +19,13 @@ from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.scenario import load_scenario
 from groundstation.settings.sections import CAMERA, driver_sections
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.stand_ins import manual_clock
 from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
+from sim_bridge.world.ardrone import Quadrotor
 
 pytestmark = [pytest.mark.slow, pytest.mark.study]
 # A search of the whole room, a carried target, a pillar in the way, a sharp turn.
@@ -105,3 +108,24 @@ def test_a_loss_is_told_within_a_second_with_where_the_target_may_be() -> None:
     told = [(when_s, text) for when_s, text in kidnap.events if when_s >= kidnap.carried_s and "turtlebot" in text]
     assert told[0][0] - kidnap.carried_s <= 1.0
     assert re.search(r"is not seen for 0\.\d s: it may be hidden near \(-?\d\.\d, -?\d\.\d\)", told[0][1])
+
+
+class CutFlight(ScenarioFlight):
+    """Stops the motors of drone_1 at 10 s, without a fault of the file."""
+
+    def watch(self) -> None:
+        super().watch()
+        drone = self.world.drones["drone_1"]
+        if self.world.time_s >= 10.0 and isinstance(drone, Quadrotor):
+            drone.autopilot.cut_motors()
+
+
+def test_drones_that_fall_have_come_down_and_violate_where_the_file_does_not_stop_them() -> None:
+    drawn, sections = order("random-walk")
+    blocked = Fault(kind=FaultKind.PROPELLER_BLOCKED, entity="drone_2", start_s=10.0)
+    drawn = replace(drawn, scenario=drawn.scenario.model_copy(update={"faults": (blocked,)}))
+    flown = CutFlight(drawn, sections, 6.0, "ours").fly()
+    assert flown["landings"] == 2
+    assert [line.split(" at ")[0] for line in flown["violations"]] == ["drone_1 fell"]
+    assert set(flown["reasons"]) == {"drone_1", "drone_2"}
+    assert "landings 2 > 0" in flown["missed"]

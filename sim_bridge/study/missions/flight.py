@@ -5,11 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from sim_bridge.study.faults.draw import Drawn
-from sim_bridge.study.faults.flight import FaultFlight
+from sim_bridge.study.faults.flight import DOWN, FaultFlight
 from sim_bridge.study.faults.vehicles import Section
 
 _DOWN_BY_S = 15.0
-_STANDS, _LANDS = "LANDED", "LANDING"
+_STAND = frozenset({"LANDED", "CUT"})
 
 
 class MissionFlight(FaultFlight):
@@ -28,13 +28,13 @@ class MissionFlight(FaultFlight):
             return over
         if self._landing_since_s is None:
             self._landing_since_s = self.world.time_s
-            self._landed_before = [name for name, mode in self._modes().items() if mode in (_LANDS, _STANDS)]
+            self._landed_before = [name for name, mode in self.modes().items() if mode in DOWN]
             self.orders.land(self.now_ns, self.drivers.hosts)
-        stand = not self.world.airborne and all(mode == _STANDS for mode in self._modes().values())
+        stand = not self.world.airborne and all(mode in _STAND for mode in self.modes().values())
         return stand or self.world.time_s - self._landing_since_s >= _DOWN_BY_S
 
     def fly(self) -> dict[str, Any]:
-        """Fly to the end; landed_before: drones that landed without the order, as their drivers say.
+        """Fly to the end; landed_before: drones that came down without the order, as their drivers say.
 
         landed: whether all stand at the end, by truth.
         """
@@ -52,6 +52,3 @@ class MissionFlight(FaultFlight):
             "planning": report["planning"],
             "spent_s": report["spent_s"],
         }
-
-    def _modes(self) -> dict[str, str]:
-        return {name: str(host.watchdog.mode) for name, host in self.drivers.hosts.items()}

@@ -1,26 +1,25 @@
 """One flight of a scenario: the campaign's, with the file's target, surroundings and faults, and other figures."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from groundstation.bus.messages import Message
+from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.link_bursts import with_bursts
 from sim_bridge.scenario import Scenario
 from sim_bridge.scenario_fit import misfits
 from sim_bridge.site import parse_site
 from sim_bridge.study.faults.draw import Drawn
-from sim_bridge.study.faults.flight import JUDGE_S, FaultFlight
+from sim_bridge.study.faults.flight import DOWN, JUDGE_S, FaultFlight
 from sim_bridge.study.faults.flight_order import WrongOrder
 from sim_bridge.study.faults.hosted_kinds import unbroken
-from sim_bridge.study.faults.judge import OBSTACLE_M
+from sim_bridge.study.faults.judge import FELL_M_S, OBSTACLE_M
 from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.figures import SEPARATION_M, TrackingErrors, shortfalls
 from sim_bridge.study.scenarios.first_program import along_an_edge
 from sim_bridge.study.scenarios.strategies import STRATEGIES
 from sim_bridge.study.wrong_figures import WrongFigures
 from sim_bridge.surroundings import ScenarioExpectation
-
-_DOWN = ("LANDING", "LANDED")
 
 
 def as_drawn(field: dict[str, Any], scenario: Scenario, seed: int) -> Drawn:
@@ -71,16 +70,23 @@ class ScenarioFlight(FaultFlight):
         violations = [f"fence {judge.fence_m:.2f} m"] * (judge.fence_m > 0.0)
         violations += [f"obstacle {judge.obstacle_m:.2f} m"] * (judge.obstacle_m < OBSTACLE_M)
         violations += [f"separation {judge.separation_m:.2f} m"] * (judge.separation_m < SEPARATION_M)
-        modes = [str(host.watchdog.mode) for host in self.drivers.hosts.values()]
+        violations += [f"{name} fell at {sinking:.1f} m/s" for name, sinking in self._falls()]
         figures = {
             **self._errors.figures(),
-            "landings": sum(mode in _DOWN for mode in modes),
+            "landings": sum(mode in DOWN for mode in self.modes().values()),
             "violations": violations,
             "switches": self._switches,
         }
         expected = self.scenario.expected or ScenarioExpectation()
         missed = shortfalls(figures, expected)
         return {**figures, "missed": [*missed, *filter(None, [self.planning.failed])]}
+
+    def _falls(self) -> Iterator[tuple[str, float]]:
+        """Yield drones that fell, and how fast [m/s]; one whose propeller the file blocks only came down."""
+        blocked = {fault.entity for fault in self.scenario.faults if fault.kind is FaultKind.PROPELLER_BLOCKED}
+        for name, sinking_m_s in self.judge.sinking_m_s.items():
+            if sinking_m_s > FELL_M_S and name not in blocked:
+                yield name, sinking_m_s
 
     def fly(self) -> dict[str, Any]:
         """Fly to the end; returns seed, strategy, figures and the time spent."""
@@ -92,7 +98,7 @@ class ScenarioFlight(FaultFlight):
             "strategy": self._strategy,
             "flown": flown,
             **(self.figures() if flown else nothing),
-            "reasons": {n: r for n, r in report["reasons"].items() if report["modes"][n] in _DOWN},
+            "reasons": {n: r for n, r in report["reasons"].items() if report["modes"][n] in DOWN},
             "planning": report["planning"],
             "spent_s": report["spent_s"],
         }

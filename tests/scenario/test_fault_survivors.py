@@ -23,7 +23,6 @@ BLIND = {
     "blind_until_it_lands_and_sees_again": (40, ["uniform_floor"]),
     "blind_while_hardly_moving": (41, ["uniform_floor"]),
     "blind_after_its_heading_jumped": (12, ["heading_jumping", "uniform_floor"]),
-    "blind_and_then_deaf": (23, ["at_deaf", "uniform_floor"]),
 }
 
 # Silent within 40 ms of losing its floor: it cannot report that it is blind.
@@ -97,12 +96,14 @@ def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
 # floor and freezes half a second later: it drifts at 0.1 m/s in the ceiling's view and is at rest only when it has
 # landed, after 6.8 s, as with 2 of 5 other seeds. An autopilot whose velocity sticks as it turns rests after 4.9 s.
 # The velocity of the third drifts at the border of the view, and its setpoints lead 0.5 m off its believed place for
-# 1.6 s.
+# 1.6 s. The last is stopped without a floor in view; then it hears nothing, keeps the tilt of its last command
+# and flies 1.4 m, at up to 0.4 m/s, until its own firmware has landed it.
 _FROZEN_TOO = ["uniform_floor", "telemetry_frozen"]
 UNSAFE = {
     "frozen_after_it_is_blind": (48132, {"rest"}, [], "lab", _FROZEN_TOO),
     "turning_as_its_velocity_sticks": (140017, {"rest"}, [], "mixed-team", []),
     "drifting_in_the_corner_of_the_view": (7115, {"unlocalised"}, ["cameras.fps=15"], "lab", []),
+    "blind_and_then_deaf": (23, {"resumed"}, ["cameras.fps=15"], "lab", []),
 }
 
 
@@ -150,7 +151,8 @@ def test_a_drone_that_is_silent_and_blind_at_once_is_braked() -> None:
 @pytest.mark.study
 @pytest.mark.parametrize(("seed", "kinds", "drawn"), SEEN_WHILE_BLIND.values(), ids=SEEN_WHILE_BLIND)
 def test_a_blind_drone_in_sight_of_a_camera_stands_still(seed: int, kinds: list[str], drawn: list[str]) -> None:
-    assert safely_flown(order_of([]) | {"kinds": drawn}, seed, kinds)["rest_s"] <= 2.5
+    rest_s = safely_flown(order_of([]) | {"kinds": drawn}, seed, kinds)["rest_s"]
+    assert rest_s is None or rest_s <= 2.5, "None: of two spells, none lasts until the rest is due"
 
 
 @pytest.mark.slow
@@ -233,5 +235,5 @@ def test_flights_known_as_unsafe_are_unsafe_in_that_way_only(
     assert set(flown["unsafe"]) == unsafe
     assert flown["fence_m"] == 0.0
     assert flown["separation_m"] >= 0.7
-    assert (flown["rest_s"] or 0.0) <= 7.0, "no stop was demanded of the last one"
+    assert (flown["rest_s"] or 0.0) <= 7.0
     assert flown["unlocalised_s"] <= 2.0

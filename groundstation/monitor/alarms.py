@@ -7,6 +7,7 @@ from itertools import combinations
 from groundstation.bus.messages import (
     AIRBORNE,
     NEVER_S,
+    NOT_DOWN,
     STANDING,
     EntityEstimate,
     FlightState,
@@ -22,7 +23,7 @@ from groundstation.monitor.alarm import TO_DO, Alarm
 from groundstation.monitor.batteries import Battery, Charge, battery_of
 from groundstation.monitor.before_flight import forbidding
 from groundstation.monitor.endurance import flies, may_fly
-from groundstation.monitor.failsafe_words import NOT_DOWN, failsafe_words, will_land
+from groundstation.monitor.failsafe_words import failsafe_words, will_land
 from groundstation.monitor.state import MonitorState
 
 VEHICLE_SILENT_S = 1.0

@@ -2,13 +2,11 @@
 
 from typing import NamedTuple
 
-from groundstation.bus.messages import AIRBORNE, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, NOT_DOWN, VehicleStatus
 
 # As drivers end the reason for a hover that only an order ends.
 _NEEDED = "; RESUME is needed"
 _UNCUT = "cut_ignored"
-# Values of VehicleStatus.failsafe of a vehicle that lands, and does not come down.
-NOT_DOWN = frozenset({"flies_away", "landing_overdue"})
 _RESUME = "To do: press RESUME, or HOLD to keep it there"
 
 _STAY_AWAY = "To do: stay away until it is down, it is told to land; CUT MOTORS tries to stop its motors again."

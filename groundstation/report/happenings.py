@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 
-from groundstation.bus.messages import AIRBORNE, OPERATOR, STANDING, UP, AckStage, Verb
+from groundstation.bus.messages import AIRBORNE, NOT_DOWN, OPERATOR, STANDING, UP, AckStage, Verb
 from groundstation.report.aloft import aloft_at
 from groundstation.report.tracks import RunData
 
@@ -91,15 +91,18 @@ def _faults(data: RunData) -> Iterator[Happening]:
 
 def _reactions(data: RunData, drone: str) -> Iterator[Happening]:
     """Yield each entry into a mode by a failsafe, and each unexplained end of a flight."""
-    before, left_s, up, explained = ("", ""), None, False, False
+    before, left_s, up, explained = "", None, False, False
+    told = set[str]()
     for item in sorted(data.vehicles[drone], key=lambda item: item.time_s):
-        status, now = item.message, (item.message.mode, item.message.failsafe)
-        if status.failsafe and now != before:
-            ends = status.mode in _ENDING
+        status = item.message
+        if status.mode != before or not status.failsafe:
+            before, told = status.mode, set()
+        if status.failsafe and status.failsafe not in told:
+            told.add(status.failsafe)
+            ends = status.mode in _ENDING and status.failsafe not in NOT_DOWN
             explained = explained or ends
             text = f"{status.mode} by failsafe {status.failsafe}: {status.detail}"
             yield Happening(item.time_s, drone, status.failsafe, text, ends)
-        before = now
         if status.flight_state in AIRBORNE and left_s is None:
             left_s = item.time_s
         if status.flight_state in UP and not up:

@@ -22,6 +22,7 @@ from groundstation.bus.messages.belief import (
 from groundstation.bus.messages.flight import (
     AIRBORNE,
     KEPT_IN_PLACE,
+    NOT_DOWN,
     OPERATOR,
     STANDING,
     STOP_LIVES_NS,
@@ -73,6 +74,7 @@ __all__ = [
     "ALL_DOWN",
     "KEPT_IN_PLACE",
     "NEVER_S",
+    "NOT_DOWN",
     "STANDING",
     "UNHEARD",
     "UP",

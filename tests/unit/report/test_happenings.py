@@ -112,6 +112,21 @@ def test_an_ordered_landing_is_no_failsafe():
         assert happenings(flown) == []
 
 
+def test_an_ordered_landing_that_was_late_for_a_moment_is_no_failsafe_either():
+    flown = data(
+        (1, UP, "TRACK", ""), (9, SINKS, "LANDING", ""), (18, SINKS, "LANDING", "landing_overdue"),
+        (19, SINKS, "LANDING", ""), (20, DOWN, "LANDED", ""), commands=[(9.0, m.Verb.LAND, ("a",))],
+    )  # fmt: skip
+    assert [item.cause for item in happenings(flown)] == ["landing_overdue"]
+    assert landings(happenings(flown)) == []
+
+
+def test_a_failsafe_that_lands_is_told_once_though_its_landing_is_late_meanwhile():
+    causes = ["battery_low", "landing_overdue", "battery_low"]
+    flown = data((1, UP, "TRACK", ""), *((9 + i, SINKS, "LANDING", why) for i, why in enumerate(causes)))
+    assert [item.cause for item in happenings(flown)] == causes[:2]
+
+
 @pytest.mark.parametrize(
     ("scope", "ordered_s", "falls"),
     [((), 5.0, True), (("a",), 5.0, True), (("b",), 5.0, False), (("a", m.OPERATOR), 5.0, False), ((), 9.5, False)],

@@ -18,8 +18,9 @@ class ComingDown:
         self.height_m = _UNKNOWN_M
 
     def hear(self, entity: EntityEstimate) -> None:
-        """Take the tracker's estimate."""
-        self.height_m = max(0.0, entity.mean[2])
+        """Take the tracker's estimate; one without a height changes nothing."""
+        if len(entity.mean) >= 3:
+            self.height_m = max(0.0, entity.mean[2])
 
 
 def away(seen_m_s: Sequence[float] | None, climb_m_s: float | None, most_m_s: float) -> str:

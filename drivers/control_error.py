@@ -19,6 +19,8 @@ _TURNING_S = 0.5
 _LONGEST_STEP_S = 0.2
 # Residual motion after a take-off, and its climb.
 _FIRST_M_S, _FIRST_CLIMB_M_S = 0.2, 1.0
+# The fastest climb that a field allows: one that continues to its take-off height may fly it.
+_RISES_M_S = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +119,7 @@ class ControlErrorMonitor:
         turning = _TURNING_S * abs(told.yaw_rate_rad_s) * math.hypot(*wanted)
         strays = self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported")
         strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
-        strays = self._judge_climb(climb_m_s, up, dt_s) or strays
+        strays = self._judge_climb(climb_m_s, _RISES_M_S if view.rises else up, dt_s) or strays
         if view.foreign:  # others command it, but our limits hold
             self.reset()
             strays = ""

@@ -23,7 +23,8 @@ _PAUSES = frozenset({Condition.TRACKER_RESTARTED, Condition.TRACKER_PAUSED, Cond
 class Situation(NamedTuple):
     """The watchdog's inputs at one moment; times in ns, gap_s: time for which the driver's own loop stood still.
 
-    clearing: a take-off is clearing an emergency, within its time. entered_m: height at which it entered the mode.
+    clearing: a take-off is clearing an emergency, within its time. entered_m: height at which it entered the mode, or
+    at which a pilot let go of a landing, at piloted_ns.
     """
 
     now_ns: int
@@ -37,6 +38,7 @@ class Situation(NamedTuple):
     clearing: bool = False
     gap_s: float = 0.0
     entered_m: float = 0.0
+    piloted_ns: int = 0
 
     def since_s(self, then_ns: int) -> float:
         """Return how long ago a moment was [s]."""
@@ -66,7 +68,7 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
     _observe_state(at, holding)
     _observe_setpoints(at, holding)
     _observe_motion(vehicle, limits, holding)
-    if vehicle.away and at.mode is DriverMode.LANDING:
+    if vehicle.away and at.mode is DriverMode.LANDING and not vehicle.piloted:
         holding[Condition.FLIES_AWAY] = vehicle.away
     return holding
 
@@ -129,7 +131,8 @@ def timed(at: Situation, limits: WatchdogLimits) -> dict[Condition, float]:
     # One whose sensors are wrong is heard all the same.
     heard = at.vehicle.fresh or at.vehicle.unsound
     if at.mode is DriverMode.LANDING and heard and at.vehicle.flight_state in AIRBORNE:
-        return {Condition.LANDING_OVERDUE: at.since_s(at.entered_ns) - at.entered_m / limits.sinks_m_s}
+        since_s = at.since_s(max(at.entered_ns, at.piloted_ns))
+        return {Condition.LANDING_OVERDUE: since_s - at.entered_m / limits.sinks_m_s}
     heard_ns, any_heard_ns = at.gate.last_heard_ns, at.gate.any_heard_ns
     if heard_ns is None or any_heard_ns is None:
         lasted = {Condition.UNSEEN: at.since_s(at.take_off_ended_ns)}

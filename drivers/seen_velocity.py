@@ -36,7 +36,7 @@ class SeenVelocity:
 
     def take(self, now_ns: int, epoch: int, entity: EntityEstimate) -> None:
         """Take the tracker's estimate of the vehicle."""
-        at_ns = _place_ns(now_ns, entity) if entity.converged else None
+        at_ns = _place_ns(now_ns, entity) if entity.converged and len(entity.mean) >= 4 else None
         if at_ns is None or epoch != self._epoch:
             self._places.clear()
             self._heights.clear()

@@ -75,7 +75,7 @@ class Watchdog:
         self._clearing = False
         self._way_back = WayBack()
         self._passing: Failsafe | None = None
-        self._entered_m = 0.0
+        self._entered_m, self._piloted_ns = 0.0, 0
 
     # -- inputs -------------------------------------------------------------------------------------------------------
 
@@ -239,6 +239,8 @@ class Watchdog:
         gap_s = 0.0 if self._last_step_ns is None else (now_ns - self._last_step_ns) / NS_PER_S
         self._last_step_ns = now_ns
         self._follow_vehicle(now_ns)
+        if self.mode is DriverMode.LANDING and vehicle.piloted:
+            self._piloted_ns, self._entered_m = now_ns, vehicle.height_m
         self.evidence.step(self._situation(now_ns, gap_s), self.limits)
         self._passing = self._heed_table(now_ns)
         obeyed = self.gate.obeyed(now_ns)
@@ -262,6 +264,7 @@ class Watchdog:
         return Situation(
             now_ns, self.mode, self.reason, self.vehicle, self.upstream, self.gate, self._entered_ns,
             self._take_off_ended_ns, self._clears_in_time(now_ns), gap_s, self._entered_m,
+            self._piloted_ns,
         )  # fmt: skip
 
     def _clears_in_time(self, now_ns: int) -> bool:

@@ -116,7 +116,8 @@ class VehicleView(NamedTuple):
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: the mode in which it flies home by itself, or "".
-    foreign: others fly it, so that its speed is judged, but not by its commands.
+    foreign: others fly it, so that its speed is judged, but not by its commands; piloted: a pilot's sticks may move it.
+    rises: in HOVER it continues to its take-off height.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -142,6 +143,8 @@ class VehicleView(NamedTuple):
     away: str = ""
     homeward: str = ""
     foreign: bool = False
+    piloted: bool = False
+    rises: bool = False
 
     @property
     def plausible(self) -> "VehicleView":

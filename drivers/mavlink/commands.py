@@ -76,10 +76,6 @@ class Orders:
         """Return whether the vehicle obeys our setpoints, not a pilot's or its own."""
         return custom_mode == self._guided and not self._mode.taken_over and not self.climbs_by_itself(now_ns)
 
-    def must_keep_limits(self, now_ns: int, custom_mode: int) -> bool:
-        """Return whether its speed is limited though our setpoints do not move it: nor do a pilot's sticks."""
-        return not (self.climbs_by_itself(now_ns) or self.pilot.moves(custom_mode))
-
     @property
     def yields(self) -> str:
         """Return why it is not ours to fly, "" while it is."""
@@ -87,8 +83,11 @@ class Orders:
 
     def climbs_by_itself(self, now_ns: int) -> bool:
         """Return whether the vehicle ends its take-off by itself, without setpoints."""
-        hovers = self._flavour is Flavour.ARDUPILOT and self._action is Action.HOVER
-        return hovers and self._rises_to_take_off and now_ns < self._climb_until_ns
+        return self._flavour is Flavour.ARDUPILOT and self.rises(now_ns)
+
+    def rises(self, now_ns: int) -> bool:
+        """Return whether it continues to its take-off height, by itself or by our setpoints."""
+        return self._action is Action.HOVER and self._rises_to_take_off and now_ns < self._climb_until_ns
 
     def see(self, now_ns: int, good: EntityEstimate, reported_m_s: Vector3 | None) -> bool:
         """Take a good estimate and the velocity [base_stabilized] reported at that time; return whether both count.
@@ -142,7 +141,7 @@ class Orders:
                 if armed and landed == Landed.ON_GROUND:
                     self._ask(now_ns, "disarming", MavCmd.COMPONENT_ARM_DISARM, 0.0, 0.0)
                 if self._motors.started and now_ns - self._since_ns > _OWN_START_NS:
-                    self.events.append((MavSeverity.INFO, "its motors were started, not by us: it is disarmed"))
+                    self.events.append((MavSeverity.INFO, "its motors were started, not by us: it will be disarmed"))
             case Action.WAIT:
                 pass
         return None

@@ -11,6 +11,8 @@ from groundstation.time_units import NS_PER_S
 
 # A stream that was slowed down has come again by then.
 _ENDED_NS = NS_PER_S
+# A pilot's sticks stop it within this, and cameras see that late: their speed is a mean over half a second.
+_STOPS_NS = 3 * NS_PER_S // 2
 
 
 class ReportedFlight:
@@ -18,6 +20,7 @@ class ReportedFlight:
 
     def __init__(self, flavour: Flavour, orders: Orders, misfit: Misfit) -> None:
         self._flavour, self._orders, self._misfit = flavour, orders, misfit
+        self._piloted_ns: int | None = None
 
     def told(self, now_ns: int, known: LatestTelemetry) -> FlightState:
         """Return the state to act upon, by its reports and its orders."""
@@ -62,6 +65,17 @@ class ReportedFlight:
             return ""
         ended = now_ns - known.moved_ns > _ENDED_NS
         return slow or ("it tells no velocity, as its own estimator knows none" if ended else "its velocity stays away")
+
+    def is_piloted(self, now_ns: int, known: LatestTelemetry) -> bool:
+        """Return whether a pilot's sticks may move it; call it once a turn."""
+        moves = bool(known.base_mode & ARMED) and self._orders.pilot.moves(known.custom_mode)
+        self._piloted_ns = now_ns if moves else self._piloted_ns
+        return moves
+
+    def must_keep_limits(self, now_ns: int) -> bool:
+        """Return whether its speed is limited though our setpoints do not move it: nor do a pilot's, nor just now."""
+        stops = self._piloted_ns is not None and now_ns - self._piloted_ns < _STOPS_NS
+        return not (stops or self._orders.climbs_by_itself(now_ns))
 
     def homeward(self, now_ns: int, known: LatestTelemetry) -> str:
         """Return the mode in which it flies home by itself, or ""."""

@@ -71,7 +71,7 @@ class StatedUncertainty:
 
     def leave_floor(self, now_ns: int) -> None:
         """Note that its motors turn before lift-off."""
-        self._floor_ns = now_ns
+        self._floor_ns, self._refuses_ns = now_ns, None
 
     def see_drift(self, now_ns: int, drift_m_s: float) -> None:
         """Take the error of its velocity as measured by cameras [m/s]."""
@@ -92,7 +92,8 @@ class StatedUncertainty:
 
     def doubts(self, now_ns: int) -> str:
         """Return what to tell while it refuses the heights that it is fed, not just for a moment, or ""."""
-        refuses = self._refuses_ns is not None and now_ns - self._refuses_ns >= _REFUSES_NS
+        lately = now_ns - self._vertical_ns <= _KEPT_NS
+        refuses = lately and self._refuses_ns is not None and now_ns - self._refuses_ns >= _REFUSES_NS
         return _REFUSES_HEIGHTS if refuses else ""
 
     def attitude_std_rad(self, now_ns: int) -> float:

@@ -181,7 +181,8 @@ class MavlinkVehicle:
         known = self.telemetry
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
         heeded = self.orders.are_heeded(now_ns, known.custom_mode)
-        limited = heeded or self.orders.must_keep_limits(now_ns, known.custom_mode)
+        piloted = self._flight.is_piloted(now_ns, known)
+        limited = heeded or self._flight.must_keep_limits(now_ns)
         doubled = self._namesakes.words(now_ns, self._link.rejected.doubled(self.system))
         not_ready = doubled or self._readiness.why_not(now_ns, known)
         battery = known.batteries.charge(now_ns)
@@ -191,6 +192,7 @@ class MavlinkVehicle:
             self._flight.told(now_ns, known), self._flight.is_heard(now_ns, known), battery, not_ready,
             unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, unlocated=self.vision.missed, mute=mute,
             homeward=self._flight.homeward(now_ns, known), foreign=not heeded,
+            piloted=piloted, rises=self.orders.rises(now_ns),
         )  # fmt: skip
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:

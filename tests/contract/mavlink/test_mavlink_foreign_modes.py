@@ -63,6 +63,23 @@ def test_a_pilot_who_moves_it_by_sticks_may_be_fast_while_a_transmitter_is_heard
     assert moved_on(rig, _PLACES[rig.flavour], 2.0, transmitter) is not transmitter
 
 
+def test_a_pilot_may_stop_it_from_speed_by_a_mode_that_holds_its_place(rig):
+    firmware = rig.emulator.firmware
+    rig.track_on()
+    firmware.transmitter = True
+    rig.run(1.0)
+    firmware.enter(_PLACES[rig.flavour])
+    for _ in range(200):
+        rig.copter.fly((1.5, 0.0, 0.0), 0.0)
+        rig.run(0.01)
+    holds = CopterMode.BRAKE if rig.flavour is Flavour.ARDUPILOT else _HOLDS[rig.flavour]
+    firmware.enter(holds)
+    for turn in range(200):
+        rig.copter.fly((max(0.0, 1.5 - 0.025 * turn), 0.0, 0.0), 0.0)
+        rig.run(0.01)
+    assert rig.mode == "TRACK" and firmware.mode == holds
+
+
 def test_a_return_on_the_floor_is_no_reason_to_land(rig):
     rig.connect()
     returns = CopterMode.RTL if rig.flavour is Flavour.ARDUPILOT else px4_mode(Px4Main.AUTO, Px4Auto.RETURN)

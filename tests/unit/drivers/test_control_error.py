@@ -138,13 +138,13 @@ def test_a_hovering_vehicle_that_is_brought_back_does_what_it_is_told(back):
 # -- vertical motion --------------------------------------------------------------------------------------------------
 
 
-def ride(asked, climb, seconds=8.0):
+def ride(asked, climb, seconds=8.0, rises=False):
     """Return (time of the first alarm, its text) for a commanded climb and one that cameras see, by time."""
     monitor = ControlErrorMonitor()
     for turn in range(round(seconds / TURN_S)):
         at_s = turn * TURN_S
         command = WatchdogDecision(DriverMode.TRACK, Action.FLY, (0.0, 0.0, asked(at_s)), 0.0)
-        said = view()._replace(velocity_m_s=(0.0, 0.0, asked(at_s)))
+        said = view()._replace(velocity_m_s=(0.0, 0.0, asked(at_s)), rises=rises)
         stray = monitor.judge(round(at_s * S) + S, said, command, (0.0, 0.0), climb(at_s)).stray
         if stray:
             return at_s, stray
@@ -187,6 +187,11 @@ def test_a_vehicle_that_keeps_its_height_above_what_is_below_does_not_stray():
     """It climbs over a box at 0.5 m/s, while the tracker asks it down."""
     assert ride(lambda t: -0.4, lambda t: 0.5 if 3 < t < 4.5 else 0.0) == (None, "")
     assert ride(lambda t: -0.4, lambda t: 0.7 if 3 < t < 4 else 0.0) == (None, "")
+
+
+def test_one_that_continues_to_its_take_off_height_does_not_stray():
+    assert ride(lambda t: 0.0, lambda t: 1.0 if t < 3 else 0.0, rises=True) == (None, "")
+    assert ride(lambda t: 0.0, lambda t: 1.0 if t < 3 else 0.0)[0] is not None
 
 
 def test_nobody_is_judged_by_a_climb_that_nobody_sees():

@@ -80,6 +80,17 @@ def test_one_whose_sensors_are_wrong_is_late_as_well(landing):
     assert landing.watchdog.told == Condition.LANDING_OVERDUE
 
 
+def test_one_that_a_pilot_flies_is_late_only_some_time_after_the_pilot_has_let_go(landing):
+    landing.piloted, landing.away = True, "it flies at 1.5 m/s"
+    landing.run(30.0)
+    assert landing.watchdog.told == ""
+    landing.piloted, landing.away = False, ""
+    landing.run(8.8)
+    assert landing.watchdog.told == ""
+    landing.run(0.4)
+    assert landing.watchdog.told == Condition.LANDING_OVERDUE
+
+
 def test_a_silent_one_is_not_said_to_be_late(landing):
     landing.fresh = False
     landing.run(20.0)
@@ -120,3 +131,8 @@ def test_its_height_is_that_of_the_last_estimate_or_that_of_a_room():
         known: dict[str, Any] = {"mean": (0.0, 0.0, z, 0.0), "covariance": (1e-4,) * 16, "converged": True}
         down.hear(EntityEstimate(name="v", kind="robot", velocity_m_s=(0.0, 0.0, 0.0), age_s=0.1, **known))
         assert down.height_m == height_m
+    shapeless = EntityEstimate(
+        name="v", kind="robot", velocity_m_s=(), age_s=0.1, mean=(), covariance=(), converged=True
+    )
+    down.hear(shapeless)
+    assert down.height_m == 0.0

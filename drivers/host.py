@@ -117,9 +117,10 @@ class VehicleHost:
         near, crowded = self._near(now_ns, aloft)
         unseen_s, touches = self._unlocalised.of_flight(now_ns, aloft), self._touch_down.of_flight(aloft)
         flies_away = away(seen_m_s, climb_m_s, self.watchdog.limits.tolerated_speed_m_s)
-        view = view._replace(height_m=self._coming_down.height_m, away=flies_away)
-        view = view._replace(touches_down=touches, on_floor=self._touch_down.low)
-        return view._replace(unseen_s=unseen_s, near=near, crowded=crowded)
+        return view._replace(
+            height_m=self._coming_down.height_m, away=flies_away, touches_down=touches, on_floor=self._touch_down.low,
+            unseen_s=unseen_s, near=near, crowded=crowded,
+        )  # fmt: skip
 
     def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:
         self._neighbours.see(now_ns, estimate.entities)

@@ -33,6 +33,15 @@ def ended_page(stage: Any, severity: Severity, how: str) -> Seen:
     return page
 
 
+def announced(stage: Any, how: str) -> tuple[Seen, Any]:
+    """Return a page whose console lives on after the end was announced, and the strip that shows it."""
+    page: Seen = stage.open()
+    stage.flight.event(Severity.WARNING, f"run ended: {how}", RUN)
+    strip = page.there("banner-ended")
+    strip.wait_for(timeout=20_000)
+    return page, strip
+
+
 def stops(page: Seen) -> list[Any]:
     return [page.there(name) for name in ("land-all", "hold", "cut-motors", "drone_1-land")]
 
@@ -68,10 +77,7 @@ def test_a_normal_end_is_calm_and_leaves_nothing_to_stop(stage: Any) -> None:
 
 
 def test_an_end_without_a_landing_is_grave(stage: Any) -> None:
-    page: Seen = stage.open()
-    stage.flight.event(Severity.WARNING, "run ended: not every drone reported a landing", RUN)
-    strip = page.there("banner-ended")
-    strip.wait_for(timeout=20_000)
+    page, strip = announced(stage, "not every drone reported a landing")
     assert page.there("safety").inner_text() == "ACT"
     assert "grave" in strip.get_attribute("class")
     stage.flight.event(Severity.ERROR, "drone_1 LANDING: nothing heard of the supervisor", "drone_1")
@@ -86,10 +92,7 @@ def test_an_end_without_a_landing_is_grave(stage: Any) -> None:
 
 
 def test_an_end_that_does_not_know_whether_all_are_down_is_not_called_safe(stage: Any) -> None:
-    page: Seen = stage.open()
-    stage.flight.event(Severity.WARNING, "run ended: stopped by the operator; not every drone was heard", RUN)
-    strip = page.there("banner-ended")
-    strip.wait_for(timeout=20_000)
+    page, strip = announced(stage, "stopped by the operator; not every drone was heard")
     assert page.there("safety").inner_text() == "WATCH"
     assert "groundstation land" in strip.inner_text() and "mild" in strip.get_attribute("class")
     assert all(stop.is_enabled() for stop in stops(page))

@@ -31,20 +31,13 @@ def test_one_that_rises_is_told_after_two_seconds_and_gets_land_all_the_time(lan
     assert (landing.watchdog.reason, landing.watchdog.failsafe) == ("landing for op", "")
 
 
-def test_it_is_told_no_more_once_it_sinks(landing):
+@pytest.mark.parametrize(("rises_s", "sinks_s"), [(3.0, 0.1), (1.5, 6.0)], ids=["told before", "brakes for a while"])
+def test_one_that_sinks_is_not_told_or_no_more(landing, rises_s, sinks_s):
     landing.away = RISES
-    landing.run(3.0)
+    landing.run(rises_s)
     landing.away = ""
-    landing.run(0.1)
+    landing.run(sinks_s)
     assert (landing.watchdog.told, landing.watchdog.explanation) == ("", "landing for op")
-
-
-def test_one_that_brakes_for_a_second_and_a_half_is_not_told(landing):
-    landing.away = RISES
-    landing.run(1.5)
-    landing.away = ""
-    landing.run(6.0)
-    assert landing.watchdog.told == ""
 
 
 @pytest.mark.parametrize(("height_m", "time_s"), [(1.2, 9.0), (3.0, 15.0)])

@@ -1,6 +1,7 @@
 """Records which statements of a source have run: a probe at the start of each basic block of a function.
 
-A probe is one store into an array of bytes. Kernels have none: they run compiled. Why not a library:
+A probe is one store into an array of bytes. Kernels have none: they run compiled. Nor have functions that write a
+kernel's instructions: they run only where it is not in the cache yet. Why not a library:
 docs/decisions/0079-coverage-by-probes.md.
 """
 
@@ -8,7 +9,9 @@ import ast
 
 HITS = "__hits__"
 # Functions that numba compiles, or calls during compilation.
-COMPILED = frozenset({"kernel", "njit", "jit", "overload", "intrinsic", "lower_cast"})
+COMPILED = frozenset({"kernel", "njit", "jit", "overload", "intrinsic", "lower_cast", "in_lanes"})
+# Modules that import from here write instructions.
+_INSTRUCTIONS = "llvmlite"
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 _COMPOUND = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.Try, ast.TryStar, ast.With, ast.AsyncWith, ast.Match)
@@ -30,7 +33,8 @@ class Probes:
 def put_probes(tree: ast.Module) -> Probes:
     """Put probes into the functions of a module's tree; return their statement counts."""
     probes = Probes()
-    _enter(tree.body, probes)
+    if not any(isinstance(each, ast.ImportFrom) and each.module == _INSTRUCTIONS for each in tree.body):
+        _enter(tree.body, probes)
     return probes
 
 

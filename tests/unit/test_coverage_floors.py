@@ -52,6 +52,12 @@ def test_each_statement_outside_kernels_is_counted_once():
     assert sum(statements) == 12 and not any(hits)
 
 
+def test_functions_that_write_instructions_are_not_counted():
+    """They run where a kernel is compiled: in the run of tests, or earlier and in another process."""
+    assert put_probes(ast.parse(f"from llvmlite import ir\n{SOURCE}")).statements == []
+    assert put_probes(ast.parse("@in_lanes\ndef write(b):\n    b.add(1, 2)")).statements == []
+
+
 @pytest.mark.parametrize(("calls", "expected"), [((1,), 9), ((-1,), 4), ((0,), 8), ((1, 0, -1), 12)])
 def test_executed_statements_are_counted(calls, expected):
     statements, hits = probed(*calls)

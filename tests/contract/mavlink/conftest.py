@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from drivers.host import VehicleHost
+from drivers.mavlink.driver import RATE_HZ
 from drivers.mavlink.links.refusals import LinkRefusals
 from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.settings import MavlinkDriverSettings
@@ -45,6 +46,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # for the helper modules of 
 from mavlink_process import FakeProcess
 
 S = 1_000_000_000
+TURN_S = 1.0 / RATE_HZ
+TURN_TICKS = round(TURN_S / TICK_S)
 GROUND = ("127.0.0.1", 14999)
 
 
@@ -152,7 +155,7 @@ class Rig:
         return self.host.watchdog.mode
 
     def tick(self):
-        """Advance everything by 5 ms."""
+        """Advance everything by 5 ms; the host turns every 10 ms, and when an order asks for it."""
         self.hand.now += TICK_NS
         now = self.hand.now
         tick = self.emulator._ticks
@@ -166,7 +169,8 @@ class Rig:
                 self.track(now)
             for received in self.estimates.drain():
                 self.vehicle.see(now, received.message)
-            self.host.turn(now)
+            if tick % TURN_TICKS == 0 or self.host.due_ns() <= now:  # as run_hosts
+                self.host.turn(now)
             while self.vehicle.orders.events:
                 self.texts.append(self.vehicle.orders.events.popleft()[1])
         else:

@@ -1,5 +1,7 @@
 """A vehicle in a mode that is not ours: a return is landed, its speed stays limited; a pilot's sticks stay free."""
 
+import re
+
 import pytest
 
 from drivers.mavlink.wire.flight import VisionPositionEstimate, command_to
@@ -98,7 +100,7 @@ def test_streams_that_another_station_slowed_down_come_again_in_time(rig):
     assert rig.host.watchdog.vehicle.silence != "it tells no velocity, as its own estimator knows none"
     rig.run(3.0)
     assert rig.mode == "TRACK" and rig.host.watchdog.vehicle.fresh
-    assert sum("its velocity comes at 2 of 50 Hz: another station" in text for text in rig.texts) == 1
+    assert sum(bool(re.match("its velocity comes at [23] of 50 Hz: another station", text)) for text in rig.texts) == 1
 
 
 def test_a_resume_ends_the_pause_of_another_station(rig_of):

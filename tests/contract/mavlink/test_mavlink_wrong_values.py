@@ -241,7 +241,7 @@ def test_a_driver_that_is_to_exit_has_told_to_land_first(rig):
     rig.connect()
     rig.order(Verb.LAND)
     rig.process.stop_requested = True
-    rig.tick()
+    rig.run(0.01)
     assert rig.mode == "LANDED" and not rig.host.is_finished(rig.hand.now)
     rig.run(1.1)
     assert rig.host.is_finished(rig.hand.now)

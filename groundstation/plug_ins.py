@@ -5,6 +5,7 @@ Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera
 """
 
 import re
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache
@@ -54,6 +55,11 @@ def damage() -> str:
 
 def _installed(group: str) -> "tuple[Sequence[metadata.EntryPoint], list[str]]":
     """Return the entry points of a group, and the packages whose list of all their own cannot be read."""
+    return _installed_on(tuple(sys.path), group)
+
+
+@cache
+def _installed_on(_path: tuple[str, ...], group: str) -> "tuple[Sequence[metadata.EntryPoint], list[str]]":
     # Imported here only: commands that stop drones must not wait for it.
     from importlib import metadata
 

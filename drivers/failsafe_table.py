@@ -77,6 +77,8 @@ UNRESUMED = ", and nobody ordered RESUME"
 # Seconds by which a condition's duration decays for each second without it: failing one sixth of the time adds up.
 SLOWLY = 0.2
 EVENLY = 1.0
+# When telemetry or the supervisor counts as silent, that has lasted for so long [s].
+_NOTICED_S = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +88,7 @@ class Failsafe:
     after_s: how long the condition must have lasted (its debounce). forgets: seconds of decay per second without it
     (its hysteresis); None: all at once. modes: in which it counts. text: for the operator; `{why}` is filled in from
     the evidence. brake: hover first, because it is unknown what the vehicle was doing. limit: the setting that gives
-    the time.
+    the time, of which after_s leaves out what has passed before the condition is noticed.
     """
 
     condition: Condition
@@ -138,8 +140,7 @@ def _ends(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
 
 
 def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
-    # When silence is noticed, it has lasted for hover_after_s already.
-    noticed_s = limits.land_after_s - limits.hover_after_s
+    noticed_s = limits.land_after_s - _NOTICED_S
     land, patience = Reaction.LAND, "safety.land_after_s"
     return (
         Failsafe(Condition.STOP_REQUESTED, land, "the driver was ordered to stop"),
@@ -189,7 +190,7 @@ def _suspensions(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.SUPERVISOR_DEAD, "the supervisor is dead", 0.0, None),
         (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", limits.resume_within_s, SLOWLY),
         (Condition.TELEMETRY_SILENT, "{why}", limits.resume_within_s, SLOWLY),
-        (Condition.STATE_UNKNOWN, "the vehicle does not say what it does", limits.hover_after_s, SLOWLY),
+        (Condition.STATE_UNKNOWN, "the vehicle does not say what it does", _NOTICED_S, SLOWLY),
         (Condition.TRACKER_RESTARTED, "the tracker restarted", 0.0, None),
         (Condition.TRACKER_PAUSED, "the tracker sends it no velocity", limits.tracker_resume_within_s, None),
         (Condition.SETPOINTS_PATCHY, "the tracker's velocities come in bits only", limits.resume_within_s, SLOWLY),
@@ -230,17 +231,16 @@ def _alerts(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
 
 def _refusals() -> tuple[Failsafe, ...]:
     rows = (
-        (Condition.TELEMETRY_SILENT, "{why}", ""),
-        (Condition.NOT_STANDING, "the vehicle says {why}", ""),
-        (Condition.BATTERY_UNKNOWN, "battery unknown, at least {why} needed", "limits.battery_min"),
-        (Condition.BATTERY_LOW, "battery {why} needed", "limits.battery_min"),
-        (Condition.STOP_REQUESTED, "the ground station is stopping", ""),
-        (Condition.SUPERVISOR_DEAD, "the ground station is stopping", ""),
-        (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", ""),
-        (Condition.NOT_READY, "{why}", ""),
-        (Condition.SOMEBODY_NEAR, "{why}", "safety.min_separation_m"),
+        (Condition.TELEMETRY_SILENT, "{why}"),
+        (Condition.NOT_STANDING, "the vehicle says {why}"),
+        (Condition.BATTERY_UNKNOWN, "battery unknown, at least {why} needed"),
+        (Condition.BATTERY_LOW, "battery {why} needed"),
+        (Condition.STOP_REQUESTED, "the ground station is stopping"),
+        (Condition.SUPERVISOR_DEAD, "the ground station is stopping"),
+        (Condition.SUPERVISOR_SILENT, "the supervisor does not answer"),
+        (Condition.NOT_READY, "{why}"),
+        (Condition.SOMEBODY_NEAR, "{why}"),
     )
     return tuple(
-        Failsafe(condition, Reaction.REFUSE, text, 0.0, limit, latch=Latch.NONE, modes=_STANDS)
-        for condition, text, limit in rows
+        Failsafe(condition, Reaction.REFUSE, text, latch=Latch.NONE, modes=_STANDS) for condition, text in rows
     )

@@ -81,6 +81,16 @@ def test_every_exit_code_is_in_its_page(pages: dict[str, str]) -> None:
     ] == []
 
 
+def test_a_setting_in_the_page_of_failsafes_gives_the_time_beside_it(pages: dict[str, str]) -> None:
+    lasting = {line.split(" | ")[3] for line in pages["failsafes.md"].splitlines() if line.startswith("| ")}
+    assert {one for one in lasting if "`" in one} == {
+        "3.0 s (`safety.land_after_s`)",
+        "2.7 s (`safety.land_after_s` - 0.3 s)",
+        "10.0 s (`safety.unseen_land_after_s`)",
+        "3.0 s (`limits.battery_hold_s`)",
+    }
+
+
 def test_packages_import_each_other_in_no_circle() -> None:
     graph = import_graph()
     order = [node for layer in layers(graph) for node in layer]

@@ -5,7 +5,8 @@ from drivers.watchdog_types import WatchdogLimits
 from skein_reference.markdown import code, page, prose, table
 
 _INTRODUCTION = """\
-Everything that stops a vehicle without an order, keeps it from starting, or is told because a landing does not help.
+Everything that stops a vehicle without an order, keeps it from starting, or is only reported, because the drone is
+already landing and does not come down.
 Of the rows that apply the first one acts;
 an order of a person (CUT_MOTORS, LAND, HOLD) needs no row. Times are those of the default settings; where a setting
 gives them it stands behind.
@@ -45,8 +46,8 @@ EVIDENCE: dict[Condition, str] = {
     Condition.TOO_FAST: "reported or estimated speed above 1.3 `limits.max_speed_m_s` + 0.2 m/s",
     Condition.FLOWN_TOO_FAST: "likewise in a mode that is not ours, unless a pilot's sticks move it (MAVLink)",
     Condition.CROWDED: "the estimates of it and of another that flies and does not land are nearer to each other than "
-    "the separation, by more than two standard deviations, and it is the lower one; of two as high as each other "
-    "(0.2 m) the later one by name",
+    "`safety.min_separation_m`, by more than two standard deviations, and it is the lower one; of two as high as each "
+    "other (0.2 m) the later one by name",
     Condition.ON_FLOOR: "since its take-off it was higher, and now its estimated height, known to 0.2 m within two "
     "standard deviations, is 0.1 m or less",
     Condition.FLIES_AWAY: "by cameras it rises faster than 0.3 m/s, or is as fast as for `too_fast` and sinks by no "
@@ -56,28 +57,36 @@ EVIDENCE: dict[Condition, str] = {
     Condition.DRIVER_STOOD: "more than 0.5 s between two turns of the driver",
     Condition.NOT_READY: "the driver's own reason",
     Condition.SOMEBODY_NEAR: "a vehicle in the air whose estimate, less two standard deviations, is nearer to the pad "
-    "than the separation, or that has none",
+    "than `safety.min_separation_m`, or that has none",
 }
 
 
 def failsafe_page() -> str:
     """Return the page."""
-    rows = [_row(number, one) for number, one in enumerate(failsafes(WatchdogLimits()), start=1)]
+    limits = WatchdogLimits()
+    rows = [_row(number, one, limits) for number, one in enumerate(failsafes(limits), start=1)]
     headings = ("priority", "condition", "reaction", "lasting", "evidence", "in mode", "until", "forgotten", "text")
     return page("Failsafes", _INTRODUCTION, table(headings, rows))
 
 
-def _row(number: int, one: Failsafe) -> tuple[str, ...]:
-    lasting = "at once" if one.after_s == 0.0 else f"{one.after_s:.1f} s"
-    setting = f" ({code(one.limit)})" if one.limit else ""
+def _row(number: int, one: Failsafe, limits: WatchdogLimits) -> tuple[str, ...]:
     return (
         str(number),
         code(one.condition),
         f"{one.reaction}{', braking first' if one.brake else ''}",
-        lasting + setting,
+        _lasting(one, limits),
         prose(EVIDENCE[one.condition]),
         ", ".join(sorted(one.modes)),
         str(one.latch),
         "at once" if one.forgets is None else f"{one.forgets:g} s per s",
         prose(one.text.replace("{why}", "...")),
     )
+
+
+def _lasting(one: Failsafe, limits: WatchdogLimits) -> str:
+    if one.after_s == 0.0:
+        return "at once"
+    if not one.limit:
+        return f"{one.after_s:.1f} s"
+    passed = f"{getattr(limits, one.limit.rpartition('.')[2]) - one.after_s:.1f}"
+    return f"{one.after_s:.1f} s ({code(one.limit)}{'' if passed == '0.0' else f' - {passed} s'})"

@@ -214,6 +214,17 @@ def test_silent_telemetry_hovers_needs_resume_and_lands(new_bench):
     assert bench.run(3.2)[-1] is Action.LAND
 
 
+@pytest.mark.parametrize("lifetime_s", [0.1, 1.0])
+def test_the_life_of_setpoints_does_not_shorten_the_patience_with_other_silences(new_bench, lifetime_s):
+    frozen = Upstream(supervisor_fresh=False)
+    for name, value in (("fresh", False), ("upstream", frozen), ("state", FlightState.UNKNOWN)):
+        bench = new_bench(hover_after_s=lifetime_s, land_after_s=1.1).fly()
+        setattr(bench, name, value)
+        # It is noticed 0.3 s after it began.
+        assert Action.LAND not in bench.run(0.75)
+        assert bench.run(0.1)[-1] is Action.LAND
+
+
 def test_hold_in_a_take_off_does_not_trust_what_was_heard_before_a_silence(new_bench):
     bench = new_bench()
     bench.order(Verb.TAKEOFF)

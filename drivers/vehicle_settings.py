@@ -90,7 +90,7 @@ class SilenceLimits(DriverSection):
     setpoint_lifetime_ms caps the lifetime that a setpoint may claim.
     """
 
-    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = _SAFETY.setpoint_lifetime_ms
+    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=500)] = _SAFETY.setpoint_lifetime_ms
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = _SAFETY.land_after_s
     unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = _SAFETY.unseen_land_after_s
     min_separation_m: Positive = 0.6

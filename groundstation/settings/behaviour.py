@@ -106,10 +106,11 @@ class SafetySettings(SettingsSection):
 
     min_separation_m: Annotated[float, Field(ge=0.3, le=10)] = 0.6
     """Least distance [m] between the centres of two drones; velocities that would go below it are limited before."""
-    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
-    """Time [ms] after which a setpoint expires; a drone without a fresh one hovers."""
+    setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=500)] = 300
+    """Time [ms] after which a setpoint expires; a drone without a fresh one hovers, and after 500 needs RESUME."""
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0
-    """Time [s] without a fresh setpoint after which a drone lands. It then stays down until a new take-off."""
+    """Time [s] of silence (setpoints, telemetry, supervisor, driver) after which a drone lands, and stays down until a
+    new take-off; PX4 and ArduPilot whose driver is dead: 0.5 s."""
     unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = 10.0
     """Time [s] after which a drone lands that is known worse than max_position_std_m, or that a camera should see and
     does not; one that no camera sees lands after three times as long, however well it is known."""

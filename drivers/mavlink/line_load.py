@@ -30,7 +30,7 @@ def fault(settings: MavlinkDriverSettings) -> str:
 
 
 def caution(settings: MavlinkDriverSettings) -> str:
-    """Return that the line of a driver has little to spare in its busier direction, or "".
+    """Return that the line of a driver has little or nothing to spare in its busier direction, or "".
 
     Autopilots send less often if the line is full: too much telemetry is no fault.
     """
@@ -38,7 +38,8 @@ def caution(settings: MavlinkDriverSettings) -> str:
     busier = max(_bytes_sent(settings), received)
     if fault(settings) or _of_line(settings, busier) <= WISE:
         return ""
-    return _told("leaves little room", settings, busier, _SLOWER if _of_line(settings, received) <= WISE else "")
+    what = "cannot carry its telemetry" if _of_line(settings, received) > 1.0 else "leaves little room"
+    return _told(what, settings, busier, _SLOWER if _of_line(settings, received) <= WISE else "")
 
 
 def _told(what: str, settings: MavlinkDriverSettings, bytes_per_s: float, slower: str) -> str:

@@ -42,6 +42,8 @@ def test_a_line_that_carries_less_than_a_px4_is_sent_is_a_fault():
 def test_a_line_with_little_to_spare_is_a_caution(flavour, baud, vision_hz, share):
     fault, caution = judged(flavour, f"serial:/dev/ttyUSB0:{baud}", vision_hz)
     assert fault == "" and share in caution and caution.endswith("take a faster line")
+    what = "cannot carry its telemetry" if int(share.split()[0]) > 100 else "leaves little room"
+    assert caution.startswith(f"{what}: ")
 
 
 def test_a_lower_rate_is_advised_where_it_helps():

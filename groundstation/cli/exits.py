@@ -26,7 +26,8 @@ class ExitCode(IntEnum):
 
 _MEANING = {
     ExitCode.OK: "done",
-    ExitCode.FAILED: "the run failed its own criteria (report.json says which)",
+    ExitCode.FAILED: "judged and not good: a run failed its criteria, a check found something to mend, "
+    "a re-run differs",
     ExitCode.SETTINGS: "wrong settings or wrong usage",
     ExitCode.UNREACHABLE: "no running ground station could be reached",
     ExitCode.FAULT: "a driver, a link or a process failed, or a command was not confirmed",

@@ -70,8 +70,8 @@ class OnboardCameraSettings(SettingsSection):
     """The camera that a drone carries: source, lens, mounting."""
 
     source: Source
-    """Where the pictures come from: http://, rtsp://, ros2:// or ardrone:// address, /dev/videoN, video file or folder
-    of pictures."""
+    """Where the pictures come from: http://, rtsp://, ros2://, ardrone:// or tello:// address, /dev/videoN, video file
+    or folder of pictures."""
     calibration: CalibrationSettings
     """Lens calibration: the name of a file beside the field file, or its content."""
     position_m: OnVehicle = (0.0, 0.0, 0.0)

@@ -101,7 +101,7 @@ def _on_path(path: Sequence[PlaceForecast]) -> str:
 def _failures(forecast: Forecast) -> Section:
     rows = [("nothing", *_cells(forecast.base), "-")]
     rows += [(one.what, *_cells(one.without), ", ".join(one.unlocalised) or "-") for one in forecast.failures]
-    head = ("fails", "median", "worst", "not seen", "nobody places")
+    head = ("fails", "median", "worst", "not seen", "no longer located")
     return Section("When one fails, over the floor", head, tuple(rows), tuple(_gravest(forecast.failures)))
 
 

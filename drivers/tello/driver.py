@@ -10,6 +10,7 @@ from drivers.host import fly_one
 from drivers.plausibility.health import SUSPECT_VELOCITY_STD_M_S, Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
+from drivers.tello.height import best_height
 from drivers.tello.settings import FASTEST_M_S, TelloDriverSettings
 from drivers.tello.wire import text
 from drivers.watchdog_types import REFUSABLE, Action, VehicleView, WatchdogDecision
@@ -25,7 +26,8 @@ _FRESH_NS = 300 * NS_PER_MS
 _BEGINS_NS = 5 * NS_PER_S
 # The motors' time is reported in whole seconds.
 _MOTORS_NS = 1_300 * NS_PER_MS
-_AIRBORNE_CM = 20
+# A climb rate of 0.1 m/s is one step of its word. So long without more, the climb of a take-off is over.
+_LEVEL_DM_S, _LEVEL_NS = 1, 2 * NS_PER_S
 _STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
 _STILL_M_S = 0.25
 # Orders are repeated until they are obeyed; `command` keeps a standing vehicle awake.
@@ -44,23 +46,38 @@ LIMITS = PlausibilityLimits(
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """The newest state of the vehicle; times 0: never. motors_ns: when the motors' time last rose."""
+    """The newest state of the vehicle; times 0: never.
+
+    motors_ns: when the motors' time last rose; level_ns: since when it has been off the floor without a climb.
+    """
 
     heard_ns: int = 0
     motors_ns: int = 0
     state: text.State | None = None
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    level_ns: int = 0
+
+    def next(self, now_ns: int, state: text.State) -> "Heard":
+        """Return what is known after a further state."""
+        ran = self.state is not None and state.time > self.state.time
+        level = best_height(state).off_floor and abs(state.velocity[2]) <= _LEVEL_DM_S
+        level_ns = (self.level_ns or now_ns) if level else 0
+        return Heard(now_ns, now_ns if ran else self.motors_ns, state, velocity_from_state(state), level_ns)
 
     def airborne(self, now_ns: int) -> bool:
-        """Return whether it flies, by its distance from the floor and its motors."""
-        return self._is_high or (self.motors_ns > 0 and now_ns - self.motors_ns < _MOTORS_NS)
+        """Return whether it flies, by its height and its motors."""
+        return self.off_floor or (self.motors_ns > 0 and now_ns - self.motors_ns < _MOTORS_NS)
 
     @property
-    def _is_high(self) -> bool:
-        state = self.state
-        if state is None:
+    def off_floor(self) -> bool:
+        """Return whether it flies, by its height alone."""
+        return self.state is not None and best_height(self.state).off_floor
+
+    def has_climbed(self, now_ns: int) -> bool:
+        """Return whether the climb of a take-off is over, by its height or because it has been level for a while."""
+        if self.state is None or not self.off_floor:
             return False
-        return state.height >= _AIRBORNE_CM or _AIRBORNE_CM <= state.tof < text.NO_ECHO_CM
+        return best_height(self.state).risen or (self.level_ns > 0 and now_ns - self.level_ns >= _LEVEL_NS)
 
 
 def velocity_from_state(state: text.State) -> Vector3:
@@ -99,11 +116,9 @@ class Tello(DatagramVehicle):
         return False
 
     def _hear_state(self, now_ns: int, data: bytes) -> bool:
-        state, before = text.parse_state(data), self.heard
-        velocity = velocity_from_state(state)
-        ran = before.state is not None and state.time > before.state.time
-        self.heard = Heard(now_ns, now_ns if ran else before.motors_ns, state, velocity)
-        self._publish(now_ns, state, velocity)
+        state = text.parse_state(data)
+        self.heard = self.heard.next(now_ns, state)
+        self._publish(now_ns, state, self.heard.velocity_m_s)
         return True
 
     def _publish(self, now_ns: int, state: text.State, velocity: Vector3) -> None:
@@ -135,7 +150,7 @@ class Tello(DatagramVehicle):
             return FlightState.LANDED
         if self._asked is Action.LAND:
             return FlightState.LANDING
-        if self._asked is Action.TAKE_OFF and self.heard.state.height < 2 * _AIRBORNE_CM:
+        if self._asked is Action.TAKE_OFF and not self.heard.has_climbed(now_ns):
             return FlightState.TAKING_OFF
         still = self._asked is Action.HOVER and math.hypot(*self.heard.velocity_m_s) < _STILL_M_S
         return FlightState.HOVERING if still else FlightState.FLYING

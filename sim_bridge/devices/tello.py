@@ -41,6 +41,8 @@ _TAKE_OFF_M, _DESCENT_M_S = 0.8, 0.4
 _RESPONSE_S, _CLIMB_S, _TURN_S, _TILT_S, _MOST_M_S2 = 0.35, 0.25, 0.15, 0.12, 2.5
 # Constant disturbances (wind, a tilt that it takes for level) are trimmed away in a second or so.
 _TRIM_PER_S2, _MOST_TRIM_M_S2 = 2.0, 2.0
+# WIRE (docs/reference/tello.md 3): `h` comes in steps of 10 cm and is up to 35 cm low; here it always is by 25 to 35.
+_H_LOW_CM, _H_STEP_CM = 25, 10
 _DATAGRAMS_PER_TICK = 64
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 _FULL_M_S, _FULL_TURN_RAD_S = 1.0, math.radians(100.0)
@@ -229,14 +231,14 @@ class TelloEmulator:
         c, s = math.cos(told.yaw), math.sin(told.yaw)
         north, west = c * told.vx - s * told.vy, s * told.vx + c * told.vy
         ax, ay, az = (1000.0 * one / GRAVITY_M_S2 for one in told.accelerometers)
-        height = max(0, round(100 * (told.height - STANDING_HEIGHT_M)))
+        height = round(100 * (told.height - STANDING_HEIGHT_M)) - _H_LOW_CM
         return State(
             pitch=round(-math.degrees(told.pitch)),
             roll=round(math.degrees(told.roll)),
             yaw=round(-math.degrees(math.remainder(told.yaw, math.tau))),
             velocity=(round(10 * north), round(-10 * west), round(-10 * told.vz)),
             tof=max(10, round(100 * told.height)) if self._motor_ticks else NO_ECHO_CM,
-            height=height,
+            height=max(0, height // _H_STEP_CM * _H_STEP_CM),
             battery=round(100 * told.battery),
             time=round(self._motor_ticks * _TICK_S),
             acceleration=(ax, -ay, -az),

@@ -175,9 +175,9 @@ class Tello(DatagramVehicle):
             case Action.CUT:
                 self._repeat(now_ns, text.EMERGENCY)
                 if flies:  # it must not fly on at its last velocity
-                    self._link.send(now_ns, text.rc(0, 0, 0, 0))
+                    self._link.send(now_ns, text.CENTRED)
             case Action.LAND:  # whether it flies or not: its report may be wrong
-                self._repeat(now_ns, text.LAND)
+                self._land(now_ns)
             case Action.TAKE_OFF if not flies:
                 self._repeat(now_ns, text.TAKE_OFF if self._ready else text.SDK)
             case Action.FLY if flies:
@@ -185,9 +185,9 @@ class Tello(DatagramVehicle):
             case Action.HOVER if flies and decision.back_m_s is not None:
                 self._link.send(now_ns, self._sticks(decision.back_m_s, 0.0))
             case Action.HOVER | Action.TAKE_OFF if flies:
-                self._link.send(now_ns, text.rc(0, 0, 0, 0))
+                self._link.send(now_ns, text.CENTRED)
             case Action.IDLE if now_ns - self._sent_ns.get(text.TAKE_OFF, -_BEGINS_NS) < _BEGINS_NS:
-                self._repeat(now_ns, text.LAND)
+                self._land(now_ns)
             case _:
                 self._repeat(now_ns, text.SDK)
         if not self._ready:
@@ -208,8 +208,17 @@ class Tello(DatagramVehicle):
         shares = (right, ahead, up / own.full_climb_m_s, -math.degrees(turn) / own.full_yaw_rate_deg_s)
         return text.rc(*(round(100 * share) for share in shares))
 
+    def _land(self, now_ns: int) -> None:
+        if self._is_due(now_ns, text.LAND):
+            # WIRE (docs/reference/tello.md 2): the last sticks stay in force, also while it lands.
+            self._link.send(now_ns, text.CENTRED)
+            self._repeat(now_ns, text.LAND)
+
+    def _is_due(self, now_ns: int, word: bytes) -> bool:
+        return now_ns - self._sent_ns.get(word, -_PAUSE_NS[word]) >= _PAUSE_NS[word]
+
     def _repeat(self, now_ns: int, word: bytes) -> None:
-        if now_ns - self._sent_ns.get(word, -_PAUSE_NS[word]) >= _PAUSE_NS[word]:
+        if self._is_due(now_ns, word):
             self._sent_ns[word] = now_ns
             self._link.send(now_ns, word)
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from drivers.tello.settings import FASTEST_M_S, TelloDriverSettings, TelloSection
-from drivers.tello.wire.text import COMMAND_PORT, LAND, VIDEO_PORT, rc
+from drivers.tello.wire.text import CENTRED, COMMAND_PORT, LAND, VIDEO_PORT
 from drivers.vehicle_settings import a_process_each, values_of
 from groundstation.vehicles import ErrorHabits, Finding, KindSection, Offer, StopDatagrams, VehicleKind, VehicleOrder
 
@@ -12,6 +12,12 @@ _WIDTH_PX, _HEIGHT_PX = 960, 720  # WIRE (docs/reference/tello.md 4)
 
 def _settings(order: VehicleOrder) -> TelloDriverSettings:
     return TelloDriverSettings(**values_of(order), tello=order.section("tello", TelloSection()))
+
+
+def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
+    # Sticks in the middle never lift one that stands. The vehicle obeys every sender.
+    transport, way = "drivers.tello.failsafe_transport:TelloFailsafe", orders[0].drone.interface
+    return StopDatagrams(COMMAND_PORT, CENTRED, LAND, transport, way)
 
 
 def _moved(local_address: str, sections: Mapping[str, KindSection]) -> dict[str, dict[str, object]]:
@@ -52,8 +58,7 @@ KIND = VehicleKind(
         0.5, 5.0, 0.7, 0.05, 0.0, reports_climb=True, tells_attitude=True, tells_steps=True, fastest_m_s=FASTEST_M_S
     ),
     processes=a_process_each(_settings),
-    # Sticks in the middle never lift one that stands. The vehicle obeys every sender.
-    stop=lambda orders: StopDatagrams(COMMAND_PORT, rc(0, 0, 0, 0), LAND),
+    stop=_stop,
     sections={"tello": TelloSection},
     required=frozenset({"tello"}),
     camera="tello",

@@ -1,7 +1,7 @@
 """An emulated Tello: its motion, and its text protocol over UDP 8889 and 8890.
 
-WIRE (docs/reference/tello.md 2): sticks are kept until others come; 15 s without a command land it; answers go to the
-sender, the state to port 8890 of the one that said `command`, ten times a second.
+WIRE (docs/reference/tello.md 2): sticks are kept until others come, during a landing too; 15 s without a command land
+it; answers go to the sender, the state to port 8890 of the one that said `command`, ten times a second.
 """
 
 import math
@@ -45,8 +45,8 @@ _TRIM_PER_S2, _MOST_TRIM_M_S2 = 2.0, 2.0
 _H_LOW_CM, _H_STEP_CM = 25, 10
 _DATAGRAMS_PER_TICK = 64
 _STILL: Vector3 = (0.0, 0.0, 0.0)
+_CENTRED = (_STILL, 0.0)
 _FULL_M_S, _FULL_TURN_RAD_S = 1.0, math.radians(100.0)
-
 
 _WORDS = (TAKE_OFF, LAND, EMERGENCY, STOP, STREAM_ON, STREAM_OFF)
 
@@ -136,7 +136,7 @@ class TelloEmulator:
         self._socket = open_udp(f"emulated {name}", address, COMMAND_PORT)
         self._partner: tuple[str, int] | None = None
         self._streams = False
-        self._order = b""
+        self._order, self._sticks = b"", _CENTRED
         self._ticks = self._quiet_ticks = self._motor_ticks = 0
 
     @property
@@ -183,10 +183,13 @@ class TelloEmulator:
             self._answer(source, OK)
 
     def _fly(self, sticks: tuple[int, int, int, int]) -> None:
+        if self._order == TAKE_OFF or not self._body.motors_on:
+            return
+        right, forward, up, clockwise = (stick / 100 for stick in sticks)
+        turn = -clockwise * _FULL_TURN_RAD_S
+        self._sticks = ((forward * _FULL_M_S, -right * _FULL_M_S, up * _FULL_M_S), turn)
         if not self._order:
-            right, forward, up, clockwise = (stick / 100 for stick in sticks)
-            turn = -clockwise * _FULL_TURN_RAD_S
-            self._body.wanted = ((forward * _FULL_M_S, -right * _FULL_M_S, up * _FULL_M_S), turn)
+            self._body.wanted = self._sticks
 
     def send(self) -> None:
         """End a tick: continue the present order, and send the state when it is due."""
@@ -209,13 +212,14 @@ class TelloEmulator:
             if body.airframe.z >= _TAKE_OFF_M:
                 self._done()
         elif self._order == LAND:
-            body.wanted = ((0.0, 0.0, -_DESCENT_M_S), 0.0)
+            (forward, left, _), turn = self._sticks
+            body.wanted = ((forward, left, -_DESCENT_M_S), turn)
             if not body.airborne:
                 body.motors_on = False
                 self._done()
 
     def _done(self) -> None:
-        self._order, self._body.wanted = b"", (_STILL, 0.0)
+        self._order, self._sticks, self._body.wanted = b"", _CENTRED, _CENTRED
         if self._partner is not None:
             self._answer(self._partner, OK)
 

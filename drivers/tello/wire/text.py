@@ -11,6 +11,7 @@ STATE_PORT = 8890
 VIDEO_PORT = 11111
 SDK, TAKE_OFF, LAND, EMERGENCY = b"command", b"takeoff", b"land", b"emergency"
 STREAM_ON = b"streamon"
+CENTRED = b"rc 0 0 0 0"
 OK, ERROR = b"ok", b"error"
 # WIRE (docs/reference/tello.md 3): `tof` without an echo, as over the floor that it stands on.
 NO_ECHO_CM = 6553

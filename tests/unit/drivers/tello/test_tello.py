@@ -6,6 +6,8 @@ import math
 import random
 import socket
 import time
+from contextlib import closing
+from pkgutil import resolve_name
 
 import pytest
 
@@ -181,7 +183,8 @@ def test_it_says_when_it_hovers(flight):
     assert flight.told(Action.HOVER, state=still) == (b"rc 0 0 0 0", FlightState.HOVERING)
     assert flight.told(Action.HOVER, state=dataclasses.replace(STATE, velocity=(6, 0, 0)))[1] is FlightState.FLYING
     assert flight.told(Action.FLY, state=still)[1] is FlightState.FLYING
-    assert flight.told(Action.LAND, state=still) == (b"land", FlightState.LANDING)
+    assert flight.told(Action.LAND, state=still) == (b"rc 0 0 0 0", FlightState.LANDING)
+    assert flight.heard.recv(64) == b"land", "its last sticks would be kept while it lands"
     assert flight.told(Action.CUT, state=still)[0] == b"emergency"
     assert flight.heard.recv(64) == b"rc 0 0 0 0", "one that does not obey must not fly on at its last velocity"
 
@@ -220,7 +223,8 @@ def test_the_emulator_reports_heights_as_low_and_coarse_as_real_ones(rig):
 
 def test_one_that_says_that_it_stands_is_told_to_land_all_the_same(flight):
     """Its report may be wrong."""
-    assert flight.told(Action.LAND, state=dataclasses.replace(STATE, tof=10, height=0))[0] == b"land"
+    assert flight.told(Action.LAND, state=dataclasses.replace(STATE, tof=10, height=0))[0] == b"rc 0 0 0 0"
+    assert flight.heard.recv(64) == b"land"
 
 
 def test_a_take_off_that_is_called_off_is_followed_by_land(flight):
@@ -230,7 +234,8 @@ def test_a_take_off_that_is_called_off_is_followed_by_land(flight):
 
     def told(action: Action) -> bytes:
         flight.tello.apply(time.monotonic_ns(), WatchdogDecision(DriverMode.LANDED, action))
-        return next(word for word in iter(lambda: flight.heard.recv(64), b"") if word != b"streamon")
+        skipped = (b"streamon", b"rc 0 0 0 0")
+        return next(word for word in iter(lambda: flight.heard.recv(64), b"") if word not in skipped)
 
     flight.tello._ready = True
     assert told(Action.IDLE) == b"command"
@@ -279,7 +284,7 @@ def test_it_lands_after_fifteen_silent_seconds(rig):
 
 
 def test_emergency_stops_the_motors_and_hover_does_not_start_them(rig):
-    stop = kind_named("tello").stop([])
+    stop = kind_named("tello").stop([subject_of("tello").order()])
     rig.say(b"command")
     rig.say(stop.hover, 1.0)
     assert not rig.body.motors_on
@@ -290,12 +295,41 @@ def test_emergency_stops_the_motors_and_hover_does_not_start_them(rig):
     assert not rig.body.motors_on
 
 
-def test_the_fail_safe_lands_one_that_flies_away(rig):
+def travelled(rig, *words: bytes) -> float:
+    """Return how far one that flies at 0.6 m/s gets from an order until it stands [m]."""
     rig.say(b"command")
     rig.say(b"takeoff", 4.0)
-    rig.say(rc(0, 50, 0, 0), 1.0)
-    rig.say(kind_named("tello").stop([]).land, 4.0)
+    rig.say(rc(0, 60, 0, 0), 2.0)
+    x, y = rig.body.airframe.x, rig.body.airframe.y
+    for said in words:
+        rig.say(said)
+    rig.turn(5.0)
     assert not rig.body.motors_on
+    return math.hypot(rig.body.airframe.x - x, rig.body.airframe.y - y)
+
+
+def test_land_alone_lets_it_fly_on_with_its_last_sticks(rig):
+    assert travelled(rig, b"land") > 1.2
+
+
+def test_the_driver_centres_the_sticks_of_one_that_lands(rig, flight):
+    words = [flight.told(Action.LAND)[0], flight.heard.recv(64)]
+    assert travelled(rig, *words) < 0.6
+
+
+def test_the_fail_safe_lands_one_that_flies_away_with_centred_sticks(rig):
+    stop = kind_named("tello").stop([subject_of("tello").order()])
+    with (
+        closing(resolve_name(stop.transport)(stop.way, 2)) as transport,
+        closing(socket.socket(type=socket.SOCK_DGRAM)) as heard,
+    ):
+        heard.bind(("127.64.79.11", 0))
+        heard.settimeout(1.0)
+        transport.send(stop.land, [heard.getsockname()])
+        words = [heard.recv(64), heard.recv(64)]
+        transport.send(stop.hover, [heard.getsockname()])
+        assert heard.recv(64) == b"rc 0 0 0 0"
+    assert words == [b"rc 0 0 0 0", b"land"] and travelled(rig, *words) < 0.6
 
 
 def test_one_that_stands_and_gets_no_echo_from_the_floor_does_not_count_as_airborne():

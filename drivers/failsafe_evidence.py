@@ -63,6 +63,8 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
         holding[Condition.BATTERY_LOW] = f"{vehicle.battery:.0%}, at least {limits.battery_min:.0%}"
     if vehicle.not_ready:
         holding[Condition.NOT_READY] = vehicle.not_ready
+    if vehicle.refuses:
+        holding[Condition.TAKE_OFF_REFUSED] = vehicle.refuses
     if vehicle.near:
         holding[Condition.SOMEBODY_NEAR] = vehicle.near
     _observe_state(at, holding)

@@ -46,6 +46,7 @@ class Condition(StrEnum):
     NOT_STANDING = auto()
     BATTERY_LOW = auto()
     BATTERY_UNKNOWN = auto()
+    TAKE_OFF_REFUSED = auto()
     TAKE_OFF_OVERDUE = auto()
     TRACKER_SILENT = auto()
     TRACKER_RESTARTED = auto()
@@ -156,6 +157,9 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  "limits.battery_hold_s", SLOWLY),
         Failsafe(Condition.BATTERY_UNKNOWN, land, "its battery is unknown", limits.battery_hold_s,
                  "limits.battery_hold_s", SLOWLY),
+        # Never repeated: a blocked propeller would be spun again and again.
+        Failsafe(Condition.TAKE_OFF_REFUSED, land, "it refuses to take off: {why}",
+                 modes=frozenset({DriverMode.TAKING_OFF})),
         Failsafe(Condition.TAKE_OFF_OVERDUE, land, "take-off took too long", limits.take_off_s),
         Failsafe(Condition.TRACKER_SILENT, land, "the tracker sends it no velocity", limits.land_after_s, patience),
         Failsafe(Condition.UNSEEN, land, "the tracker sends it no velocity", limits.unseen_land_after_s,

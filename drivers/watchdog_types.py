@@ -117,7 +117,7 @@ class VehicleView(NamedTuple):
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: the mode in which it flies home by itself, or "".
     foreign: others fly it, so that its speed is judged, but not by its commands; piloted: a pilot's sticks may move it.
-    rises: in HOVER it continues to its take-off height.
+    rises: in HOVER it continues to its take-off height. refuses: its answer to the order to take off, if that refused.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -145,6 +145,7 @@ class VehicleView(NamedTuple):
     foreign: bool = False
     piloted: bool = False
     rises: bool = False
+    refuses: str = ""
 
     @property
     def plausible(self) -> "VehicleView":

@@ -1,6 +1,7 @@
 """The Tello driver: the vehicle's reports, its orders from decisions, and the process entry `run`."""
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 
 from drivers.base import HostProcess, LinkHealth, read_section
@@ -26,8 +27,10 @@ _FRESH_NS = 300 * NS_PER_MS
 _BEGINS_NS = 5 * NS_PER_S
 # The motors' time is reported in whole seconds.
 _MOTORS_NS = 1_300 * NS_PER_MS
-# A climb rate of 0.1 m/s is one step of its word. So long without more, the climb of a take-off is over.
-_LEVEL_DM_S, _LEVEL_NS = 1, 2 * NS_PER_S
+# Off the floor and no faster than this upwards or downwards for so long, a take-off is over, answered or not.
+_LEVEL_DM_S, _LEVEL_NS = 2, 2 * NS_PER_S
+# Answers name no word: `takeoff` waits so long for those to earlier ones.
+_ANSWERS_NS = NS_PER_S
 _STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
 _STILL_M_S = 0.25
 # Orders are repeated until they are obeyed; `command` keeps a standing vehicle awake.
@@ -73,11 +76,13 @@ class Heard:
         """Return whether it flies, by its height alone."""
         return self.state is not None and best_height(self.state).off_floor
 
-    def has_climbed(self, now_ns: int) -> bool:
-        """Return whether the climb of a take-off is over, by its height or because it has been level for a while."""
+    def has_climbed(self, now_ns: int, answered: bool) -> bool:
+        """Return whether a take-off is over: done by its answer and its height, or without a climb for a while."""
         if self.state is None or not self.off_floor:
             return False
-        return best_height(self.state).risen or (self.level_ns > 0 and now_ns - self.level_ns >= _LEVEL_NS)
+        if answered and best_height(self.state).risen:
+            return True
+        return self.level_ns > 0 and now_ns - self.level_ns >= _LEVEL_NS
 
 
 def velocity_from_state(state: text.State) -> Vector3:
@@ -95,8 +100,11 @@ class Tello(DatagramVehicle):
         self.heard = Heard()
         self._settings, self._bus = settings, bus
         self._ready = False
-        self._asked, self._refused = Action.WAIT, ""
+        self._asked, self._asked_ns = Action.WAIT, 0
+        self._refused, self._took_off = "", False
         self._sent_ns: dict[bytes, int] = {}
+        self._answers: deque[bytes] = deque(maxlen=16)
+        self._owed, self._owed_ns = 0, 0
         self._plausibility = MotionMonitor(LIMITS)
         here = settings.tello.local_address
         self._link = DatagramLink(
@@ -111,8 +119,7 @@ class Tello(DatagramVehicle):
     def _hear_answer(self, now_ns: int, data: bytes) -> bool:
         answer = data.strip().lower()
         self._ready = self._ready or answer == text.OK
-        if answer.startswith(text.ERROR) and self._asked in REFUSABLE:
-            self._refused = answer.decode("ascii", "replace")
+        self._answers.append(answer)
         return False
 
     def _hear_state(self, now_ns: int, data: bytes) -> bool:
@@ -150,13 +157,14 @@ class Tello(DatagramVehicle):
             return FlightState.LANDED
         if self._asked is Action.LAND:
             return FlightState.LANDING
-        if self._asked is Action.TAKE_OFF and not self.heard.has_climbed(now_ns):
+        if self._asked is Action.TAKE_OFF and not self.heard.has_climbed(now_ns, self._took_off):
             return FlightState.TAKING_OFF
         still = self._asked is Action.HOVER and math.hypot(*self.heard.velocity_m_s) < _STILL_M_S
         return FlightState.HOVERING if still else FlightState.FLYING
 
     def view(self, now_ns: int) -> VehicleView:
         """Return the vehicle's last reported state."""
+        self._heed_answers()
         heard = self.heard
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
         battery = None if heard.state is None else heard.state.battery / 100
@@ -164,12 +172,29 @@ class Tello(DatagramVehicle):
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
         scale, (x, y, z) = self._settings.velocity_scale, heard.velocity_m_s
         state = self._flight_state(now_ns)
-        return VehicleView(state, fresh, battery, not_ready, self._ready, unsound, (scale * x, scale * y, z))
+        refuses = self._refused if self._asked is Action.TAKE_OFF else ""
+        velocity = (scale * x, scale * y, z)
+        return VehicleView(state, fresh, battery, not_ready, self._ready, unsound, velocity, refuses=refuses)
+
+    def _heed_answers(self) -> None:
+        """Take the answers that came; the first after a refusable word was sent is its own."""
+        starts = self._asked is Action.TAKE_OFF
+        while self._answers:
+            answer = self._answers.popleft()
+            self._owed = max(0, self._owed - 1)
+            if starts and self._sent_ns.get(text.TAKE_OFF, 0) < self._asked_ns:
+                continue
+            if answer.startswith(text.ERROR) and self._asked in REFUSABLE and not (starts and self.heard.off_floor):
+                self._refused = answer.decode("ascii", "replace")
+            # `takeoff` is answered when it is done: an `ok` to one that stands is a late one to another word.
+            self._took_off = self._took_off or (starts and answer == text.OK and self.heard.off_floor)
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send the orders of a decision; sticks count only while it flies."""
         if decision.action is not self._asked:
-            self._asked, self._refused = decision.action, ""
+            self._heed_answers()
+            self._asked, self._asked_ns = decision.action, now_ns
+            self._refused, self._took_off = "", False
         flies = self.heard.airborne(now_ns)
         match decision.action:
             case Action.CUT:
@@ -178,8 +203,8 @@ class Tello(DatagramVehicle):
                     self._link.send(now_ns, text.CENTRED)
             case Action.LAND:  # whether it flies or not: its report may be wrong
                 self._land(now_ns)
-            case Action.TAKE_OFF if not flies:
-                self._repeat(now_ns, text.TAKE_OFF if self._ready else text.SDK)
+            case Action.TAKE_OFF if not (flies or self._refused):
+                self._take_off(now_ns)
             case Action.FLY if flies:
                 self._link.send(now_ns, self._sticks(decision.velocity_m_s, decision.yaw_rate_rad_s))
             case Action.HOVER if flies and decision.back_m_s is not None:
@@ -192,11 +217,12 @@ class Tello(DatagramVehicle):
                 self._repeat(now_ns, text.SDK)
         if not self._ready:
             self._repeat(now_ns, text.SDK)
-        elif self._settings.tello.video and not flies:
+        elif self._settings.tello.video and not (flies or decision.action is Action.TAKE_OFF):
             self._repeat(now_ns, text.STREAM_ON)
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return the state of the link, and the vehicle's answer to an order that it refused."""
+        self._heed_answers()
         word = REFUSABLE.get(self._asked)
         detail = f"it answers {self._refused!r} when told to {word}" if self._refused and word else ""
         return replace(super().health(now_ns), detail=detail)
@@ -207,6 +233,13 @@ class Tello(DatagramVehicle):
         right, ahead = -left / own.full_speed_m_s, forward / own.full_speed_m_s
         shares = (right, ahead, up / own.full_climb_m_s, -math.degrees(turn) / own.full_yaw_rate_deg_s)
         return text.rc(*(round(100 * share) for share in shares))
+
+    def _take_off(self, now_ns: int) -> None:
+        """Say `takeoff`, once nothing else waits for an answer, and again while it stands and has not answered."""
+        if not self._ready:
+            self._repeat(now_ns, text.SDK)
+        elif self._owed == 0 or now_ns - self._owed_ns >= _ANSWERS_NS:
+            self._repeat(now_ns, text.TAKE_OFF)
 
     def _land(self, now_ns: int) -> None:
         if self._is_due(now_ns, text.LAND):
@@ -219,7 +252,8 @@ class Tello(DatagramVehicle):
 
     def _repeat(self, now_ns: int, word: bytes) -> None:
         if self._is_due(now_ns, word):
-            self._sent_ns[word] = now_ns
+            self._sent_ns[word] = self._owed_ns = now_ns
+            self._owed += 1
             self._link.send(now_ns, word)
 
 

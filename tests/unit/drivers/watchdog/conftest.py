@@ -28,7 +28,7 @@ class Bench:
         self.seen = True
         self.near, self.crowded, self.away, self.clears = "", "", "", clears
         self.height, self.homeward, self.foreign = 1.2, "", False
-        self.piloted = False
+        self.piloted, self.refuses = False, ""
         self.holds = False
         self.upstream = Upstream()
         self.epoch = 1
@@ -58,7 +58,10 @@ class Bench:
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
         seen = view._replace(unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
         seen = seen._replace(touches_down=self.touches_down, on_floor=self.on_floor, foreign=self.foreign)
-        seen = seen._replace(height_m=self.height, away=self.away, homeward=self.homeward, piloted=self.piloted)
+        seen = seen._replace(refuses=self.refuses)
+        seen = seen._replace(
+            height_m=self.height, away=self.away, homeward=self.homeward, piloted=self.piloted, refuses=self.refuses
+        )
         return seen._replace(speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
 
     def see(self):

@@ -5,7 +5,8 @@ import itertools
 
 import pytest
 
-from drivers.watchdog_types import DriverMode
+from drivers.failsafe_table import Condition
+from drivers.watchdog_types import Action, DriverMode
 from groundstation.bus.messages import AIRBORNE, AckStage, FlightState, Verb
 
 MS = 1_000_000
@@ -133,3 +134,17 @@ def test_an_accepted_order_stands_for_a_second_or_what_undid_it_is_named(new_ben
                 break
             before = decision.mode
     assert accepted
+
+
+def test_a_refused_take_off_ends_with_the_vehicles_reason_until_the_next_order(new_bench):
+    bench = new_bench()
+    bench.order(Verb.TAKEOFF)
+    assert bench.step().action is Action.TAKE_OFF
+    bench.refuses = "error motor stop"
+    decision = bench.step()
+    assert (decision.action, bench.watchdog.failsafe) == (Action.LAND, Condition.TAKE_OFF_REFUSED)
+    bench.refuses = ""
+    assert set(bench.run(20)) == {Action.LAND, Action.IDLE}
+    assert bench.watchdog.reason == "landed (it refuses to take off: error motor stop)"
+    assert bench.order(Verb.TAKEOFF).stage is AckStage.ACCEPTED
+    assert bench.step().action is Action.TAKE_OFF

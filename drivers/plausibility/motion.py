@@ -14,6 +14,7 @@ from drivers.plausibility.clock_watch import ClockWatch
 from drivers.plausibility.health import ALL_GOOD, Finding, Health, HealthReport, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.repeats import RepeatWatch, StandstillWatch
+from drivers.plausibility.tick_watch import TickWatch
 from groundstation.bus.messages import AIRBORNE, UP, FlightState
 
 _Judged = tuple[Sensor, Health, str]
@@ -25,7 +26,8 @@ _GAP_S = 0.3
 
 
 class MotionSample(NamedTuple):
-    """Motion in one packet. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it has none.
+    """Motion in one packet. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it has none; counted_s:
+    likewise of a counter that runs with its motors.
 
     velocity_m_s: horizontal, as reported, in axes of the vehicle's choice; heading_rad: of the vehicle in these axes;
     climb_m_s: 0 if none is used. roll_rad, pitch_rad [FLU]; inertial: rates and specific forces, empty if not reported.
@@ -39,6 +41,7 @@ class MotionSample(NamedTuple):
     vehicle_ns: int | None = None
     heading_rad: float = 0.0
     climb_m_s: float = 0.0
+    counted_s: int | None = None
 
     @property
     def speed_m_s(self) -> float:
@@ -63,13 +66,14 @@ class MotionMonitor:
         self.limits = limits
         self._contents, self._attitude, self._inertial = RepeatWatch(), RepeatWatch(), RepeatWatch()
         self._velocity = (StandstillWatch(), StandstillWatch())
+        self._ticks = TickWatch()
         self._clock, self.clock = ClockWatch(limits.clock_wrap_s, _SLOWER), ClockDrift()
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, for a vehicle that stands."""
         self.report = ALL_GOOD
-        for watch in (self._contents, self._attitude, self._inertial, *self._velocity, self._clock):
+        for watch in (self._contents, self._attitude, self._inertial, *self._velocity, self._clock, self._ticks):
             watch.reset()
         self._before: MotionSample | None = None
         self._sound: MotionSample | None = None
@@ -87,7 +91,7 @@ class MotionMonitor:
             self.report = self._settle(sample.stamp_ns, self._judge_standing(sample))
             return self.report
         judged = self._judge_repeats(sample, state in UP)
-        judged += self._judge_clock(sample)
+        judged += self._judge_clock(sample) + self._judge_ticks(sample)
         judged += self._judge_values(sample)
         withheld = not self._is_sound(sample)
         self._before = sample
@@ -181,6 +185,18 @@ class MotionMonitor:
             return []
         health = Health.BAD if late_s >= limits.clock_late_s else Health.SUSPECT
         return [(Sensor.CLOCK, health, f"its telemetry is {late_s:.1f} s late")]
+
+    def _judge_ticks(self, sample: MotionSample) -> list[_Judged]:
+        if sample.counted_s is None:
+            return []
+        limits = self.limits
+        newest_s, both_s = self._ticks.update(sample.stamp_ns, sample.counted_s)
+        # A verdict lasts until the next step: after a pause of the link a punctual one ends it at once.
+        self._held.pop(Sensor.CLOCK, None)
+        if newest_s < limits.clock_suspect_s:
+            return []
+        health = Health.BAD if both_s >= limits.clock_late_s else Health.SUSPECT
+        return [(Sensor.CLOCK, health, f"its telemetry is {newest_s:.1f} s late")]
 
     # -- values and steps ---------------------------------------------------------------------------------------------
 

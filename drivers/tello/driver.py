@@ -130,9 +130,10 @@ class Tello(DatagramVehicle):
 
     def _publish(self, now_ns: int, state: text.State, velocity: Vector3) -> None:
         roll, pitch, yaw = math.radians(state.roll), -math.radians(state.pitch), -math.radians(state.yaw)
-        sample = MotionSample(now_ns, velocity[:2], roll, pitch, state.acceleration, climb_m_s=velocity[2])
+        climb, counted = velocity[2], state.time
+        sample = MotionSample(now_ns, velocity[:2], roll, pitch, state.acceleration, climb_m_s=climb, counted_s=counted)
         report = self._plausibility.update(sample, self._flight_state(now_ns))
-        believed = report.of(Sensor.TELEMETRY, Sensor.VELOCITY)
+        believed = report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.VELOCITY)
         if report.withheld or believed is Health.BAD:
             return
         variance = self._settings.velocity_std_m_s**2 + _STEP_STD_M_S**2

@@ -16,13 +16,13 @@ _SLOWED = 500e-6
 class ClockWatch:
     """Compares the times at which values were made and received; the freshest ones define the usual delay.
 
-    wrap_s: time at which the clock starts over; slower: by which share of the time it may run slower than ours. What
-    is late stays late for (lateness / slower).
+    wrap_s: time at which the clock starts over; slower: by which share of the time it may run slower than ours; may be
+    set anew at any time. What is late stays late for (lateness / slower), longer if its clock is slow.
     """
 
     def __init__(self, wrap_s: float | None = None, slower: float = _SLOWED) -> None:
         self._wrap_ns = None if wrap_s is None else round(wrap_s * 1e9)
-        self._slower = slower
+        self.slower = slower
         self.reset()
 
     def reset(self) -> None:
@@ -76,7 +76,7 @@ class ClockWatch:
         if self._least_ns is None:
             self._least_ns, self._fresher = offset_ns, []
         else:
-            self._least_ns += round(self._slower * (stamp_ns - self._least_at_ns))
+            self._least_ns += round(self.slower * (stamp_ns - self._least_at_ns))
         self._least_at_ns = stamp_ns
         if offset_ns >= self._least_ns - _FRESHER_NS:
             self._least_ns, self._fresher = min(self._least_ns, offset_ns), []

@@ -19,8 +19,9 @@ from groundstation.bus.messages import AIRBORNE, UP, FlightState
 
 _Judged = tuple[Sensor, Health, str]
 _CLOCK_STANDS, _FROZEN = "its clock stands", "its telemetry is frozen: all values repeat"
-# Nothing is known of the quality of a vehicle's clock.
-_SLOWER = 0.005
+# A vehicle's clock may be slower than it was measured to be by this share of the time. At most so slow a one is
+# followed; in flight it is followed by so much more or less per second, as a queue that grows looks like a slow clock.
+_SLOWER, _SLOWEST, _SETTLES_PER_S = 0.005, 0.02, 20e-6
 # After a pause a step between two values means nothing.
 _GAP_S = 0.3
 
@@ -67,6 +68,8 @@ class MotionMonitor:
         self._contents, self._attitude, self._inertial = RepeatWatch(), RepeatWatch(), RepeatWatch()
         self._velocity = (StandstillWatch(), StandstillWatch())
         self._ticks = TickWatch()
+        self._slow: float | None = None
+        self._noted_ns = 0
         self._clock, self.clock = ClockWatch(limits.clock_wrap_s, _SLOWER), ClockDrift()
         self.reset()
 
@@ -84,7 +87,7 @@ class MotionMonitor:
     def update(self, sample: MotionSample, state: FlightState) -> HealthReport:
         """Take a sample of a vehicle in a flight state; return the present health report."""
         if sample.vehicle_ns is not None:
-            self.clock.update(sample.stamp_ns, sample.vehicle_ns)
+            self._follow_clock(sample.stamp_ns, sample.vehicle_ns, state in AIRBORNE)
         if state not in AIRBORNE:
             if self._before is not None:
                 self.reset()
@@ -97,6 +100,20 @@ class MotionMonitor:
         self._before = sample
         self.report = self._settle(sample.stamp_ns, judged, withheld)
         return self.report
+
+    def _follow_clock(self, stamp_ns: int, vehicle_ns: int, flies: bool) -> None:
+        """Measure the rate of the vehicle's clock, and follow it where it is slow: that is no lateness."""
+        self.clock.update(stamp_ns, vehicle_ns)
+        elapsed_s, self._noted_ns = (stamp_ns - self._noted_ns) * 1e-9, stamp_ns
+        figures = self.clock.figures
+        if figures is None or figures.drift_ppm is None:
+            return
+        slow = min(max(-1e-6 * figures.drift_ppm, 0.0), _SLOWEST)
+        if flies and self._slow is not None:
+            most = _SETTLES_PER_S * elapsed_s
+            slow = min(max(slow, self._slow - most), self._slow + most)
+        self._slow = slow
+        self._clock.slower = _SLOWER + slow
 
     def _is_sound(self, sample: MotionSample) -> bool:
         """Return whether a velocity is possible, and near the last one that was, or else near the one before it.

@@ -74,7 +74,7 @@ def test_a_vehicle_on_the_floor_is_listened_to_as_well() -> None:
 
 
 def flown(delay_s, ppm=0.0, seconds=900.0, floor_s=20.0, period_ms=50):
-    """Return when the clock was first BAD [s since lift-off], None: never; delay_s: of a packet, by when it was made."""
+    """Return when the clock was first BAD [s since lift-off], None: never; delay_s: of a packet made then."""
     monitor, rng = MotionMonitor(ARDRONE), np.random.default_rng(5)
     for number in range(round((floor_s + seconds) * 1000 / period_ms)):
         at_s = number * period_ms / 1000 - floor_s

@@ -46,3 +46,17 @@ def test_the_fail_safe_lands_one_that_flies_away_with_centred_sticks(rig):
         transport.send(stop.hover, [heard.getsockname()])
         assert heard.recv(64) == b"rc 0 0 0 0"
     assert words == [b"rc 0 0 0 0", b"land"] and travelled(rig, *words) < 0.6
+
+
+def test_a_deaf_one_flies_as_far_as_the_safety_page_says(rig):
+    """It hears nothing any more: its last sticks stay in force for 15 s, and while it lands."""
+    rig.say(b"command")
+    rig.say(b"takeoff", 4.0)
+    x, y = rig.body.airframe.x, rig.body.airframe.y
+    rig.say(rc(0, 60, 0, 0))
+    rig.vehicle.deaf = True
+    for _ in range(20):
+        rig.say(b"rc 0 0 0 0", 0.5)
+        rig.say(b"emergency", 0.5)
+    assert not rig.body.motors_on
+    assert 9.0 < math.hypot(rig.body.airframe.x - x, rig.body.airframe.y - y) < 11.5

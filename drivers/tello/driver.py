@@ -253,8 +253,9 @@ class Tello(DatagramVehicle):
 
     def _repeat(self, now_ns: int, word: bytes) -> None:
         if self._is_due(now_ns, word):
+            # An answer that has not come by now was lost.
+            self._owed = 1 + (self._owed if now_ns - self._owed_ns < _ANSWERS_NS else 0)
             self._sent_ns[word] = self._owed_ns = now_ns
-            self._owed += 1
             self._link.send(now_ns, word)
 
 

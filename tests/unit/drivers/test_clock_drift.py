@@ -79,9 +79,9 @@ def flown(delay_s, ppm=0.0, seconds=900.0, floor_s=20.0, period_ms=50):
     for number in range(round((floor_s + seconds) * 1000 / period_ms)):
         at_s = number * period_ms / 1000 - floor_s
         heard_s = at_s + delay_s(at_s) + rng.uniform(0.0, 0.004)
-        values = tuple(rng.normal(0.0, 0.003, 3).tolist())
+        a, b, c = rng.normal(0.0, 0.003, 3).tolist()
         vehicle_ns = round(number * period_ms * MS * (1.0 + 1e-6 * ppm))
-        sample = MotionSample(BOOTED + round(heard_s * 1e9), values[:2], *values[1:], values, vehicle_ns)
+        sample = MotionSample(BOOTED + round(heard_s * 1e9), (a, b), b, c, (a, b, c), vehicle_ns)
         state = FlightState.LANDED if at_s < 0.0 else FlightState.FLYING
         if monitor.update(sample, state).of(Sensor.CLOCK) is Health.BAD:
             return at_s

@@ -242,7 +242,7 @@ def test_invalid_kinds_and_options_are_named(kind, options, text):
 @pytest.mark.slow
 def test_the_plug_in_makes_a_test_of_each_check(tmp_path):
     command = [sys.executable, "-m", "pytest", "-p", "sim_bridge.conformance.plugin", "-p", "no:cacheprovider"]
-    command += ["--skein-vehicle", "tello", "--skein-only", "kind", "-q"]
+    command += ["--skein-vehicle", "ardrone", "--skein-only", "kind", "-q"]
     env = os.environ | {"PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     result = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=100, check=False)
     assert result.returncode == 0, result.stdout + result.stderr

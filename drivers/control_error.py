@@ -105,6 +105,7 @@ class ControlErrorMonitor:
         """
         dt_s = 0.0 if self._last_ns is None else min((now_ns - self._last_ns) / NS_PER_S, _LONGEST_STEP_S)
         self._last_ns = now_ns
+        view = view._replace(seen=seen_m_s is not None)  # whoever moves it
         if told is None or told.mode not in FREE or view.flight_state not in UP or view.velocity_m_s is None:
             self.reset()
             return view
@@ -120,12 +121,13 @@ class ControlErrorMonitor:
         strays = self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported")
         strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
         strays = self._judge_climb(climb_m_s, _RISES_M_S if view.rises else up, dt_s) or strays
-        if view.foreign:  # others command it, but our limits hold
-            self.reset()
-            strays = ""
         speeds = [0.0 if reported is None else math.hypot(*reported)]
         speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
-        return view._replace(speed_m_s=max(speeds), stray=strays, seen=seen_m_s is not None)
+        if view.foreign:  # others command it, but our limits hold, for a climb too
+            self.reset()
+            strays = ""
+            speeds += [view.velocity_m_s[2] if view.fresh else 0.0, climb_m_s or 0.0]
+        return view._replace(speed_m_s=max(speeds), stray=strays)
 
     def _judge_one(
         self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,

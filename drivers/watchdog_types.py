@@ -108,11 +108,11 @@ class VehicleView(NamedTuple):
     not_ready: why it may not take off, or "". configured: the driver has prepared it for flight; a driver of a standing
     vehicle is not READY before. unsound: why its reported motion cannot be true, or ""; it then counts as silent.
     velocity_m_s: the reported one, scaled to the true one; None if it reports none. speed_m_s, stray: computed by the
-    host: horizontal speed, and how the vehicle strays from its commands, or ""; seen: whether cameras show its speed;
-    unseen_s: how long its estimate may have been wrong, by the tracker; near: airborne vehicle too near to its pad,
-    or ""; crowded: why it makes way for another that is too near in flight, or "". lost_s: how long it has
-    lacked a position that it needs; unlocated: whose, and since when, in words. clears: whether a separate order ends
-    its emergency without starting motors.
+    host: horizontal speed, of one that others fly also its climb, and how the vehicle strays from its commands, or "";
+    seen: whether cameras show its speed; unseen_s: how long its estimate may have been wrong, by the tracker; near:
+    airborne vehicle too near to its pad, or ""; crowded: why it makes way for another that is too near in flight, or
+    "". lost_s: how long it has lacked a position that it needs; unlocated: whose, and since when, in words. clears:
+    whether a separate order ends its emergency without starting motors.
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: the mode in which it flies home by itself, or "".

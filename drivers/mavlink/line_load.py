@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.links.tty import BITS_PER_BYTE
-from drivers.mavlink.session import streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
+from drivers.mavlink.stream_rates import streams
 from drivers.mavlink.wire.flight import OdometryMessage, SetPositionTargetLocalNed, VisionPositionEstimate
 from drivers.mavlink.wire.frames import Message, id_of
 from drivers.mavlink.wire.names import Flavour

@@ -23,7 +23,7 @@ class Needed:
 
     accepted: lowest and highest value that are acceptable too; others: acceptable single values; flown: a wider range
     that permits a take-off, but is reported to the operator and changed by `setup`; aliases: names in other releases;
-    optional: a firmware without it flies.
+    optional: a firmware without it flies; bits: only these of a mask must be set, `setup` keeps the others.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Needed:
     flown: tuple[float, float] | None = None
     aliases: tuple[str, ...] = ()
     optional: bool = False
+    bits: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -43,6 +44,8 @@ class Needed:
 
     def takes(self, value: float) -> bool:
         """Return whether a value is acceptable."""
+        if self.bits:
+            return round(value) & self.bits == self.bits
         in_range = _lies_in(self.accepted or (self.value, self.value), value)
         return in_range or any(_lies_in((other, other), value) for other in self.others)
 
@@ -50,9 +53,15 @@ class Needed:
         """Return whether a value forbids a take-off."""
         return not (self.takes(value) or (self.flown is not None and _lies_in(self.flown, value)))
 
+    def mending(self, value: float | None) -> "Needed":
+        """Return it with the value to write in place of another one."""
+        return self if value is None or not self.bits else replace(self, value=round(value) | self.bits)
+
     @property
     def wish(self) -> str:
         """Return its permitted values, in words."""
+        if self.bits:
+            return f"{self.bits} in its sum"
         if self.accepted is not None:
             return f"{self.accepted[0]:.7g} to {self.accepted[1]:.7g}"
         return " or ".join(f"{value:.7g}" for value in (self.value, *self.others))
@@ -65,6 +74,9 @@ def _lies_in(span: tuple[float, float], value: float) -> bool:
 
 _NO_RETURN = "a return would climb first, to the ceiling"
 _CENTRE = "our positions are those of its centre"
+LOSS = "FS_THR_ENABLE"  # how an ArduPilot reacts to the loss of its transmitter; 0: not at all, and tells nobody
+# WIRE (ArduCopter 4.7, radio.cpp): with 0 a receiver without its transmitter counts as healthy for ever.
+_RECEIVES = Needed(LOSS, 3, f"with 0 it never tells a lost transmitter, so no pilot counts; {_NO_RETURN}", flown=(0, 0))
 
 
 def _offsets(stem: str) -> tuple[Needed, ...]:
@@ -119,22 +131,28 @@ _ARDUPILOT = (
     Needed(
         "FS_EKF_THRESH", 0.8, "with 0 it does not land then, with more than 1 late", REAL32, (0.6, 1), optional=True
     ),
-    Needed("FS_THR_ENABLE", 0, f"without a transmitter it would forbid arming; {_NO_RETURN}", others=(3,)),
+    Needed(LOSS, 0, f"without a transmitter it would forbid arming; {_NO_RETURN}", others=(3,)),
+    # WIRE (ArduCopter 4.7, RC_Channel.cpp): bit 1 ignores RC_CHANNELS_OVERRIDE and MANUAL_CONTROL; 32 from the factory.
+    Needed("RC_OPTIONS", 34, "the sticks of another ground station would fly it, and count as a pilot's", bits=2),
     Needed("BATT_FS_LOW_ACT", 1, _NO_RETURN, others=(0, 7), optional=True),
     Needed("BATT_FS_CRT_ACT", 1, _NO_RETURN, others=(0, 7), optional=True),
 )
 
 
-def needed(flavour: Flavour, our_system: int, overrides: Mapping[str, float] | None = None) -> tuple[Needed, ...]:
+def needed(
+    flavour: Flavour, our_system: int, overrides: Mapping[str, float] | None = None, receives: bool = False
+) -> tuple[Needed, ...]:
     """Return the parameters needed by a vehicle of a flavour, for this ground station's system id.
 
-    overrides: values of the field file, by name or alias; a name of its own is checked as well.
+    overrides: values of the field file, by name or alias; a name of its own is checked as well. receives: it has a
+    transmitter's receiver, so that it must, and can, react to the loss of the transmitter.
     """
     wanted: tuple[Needed, ...] = _PX4
     if flavour is Flavour.ARDUPILOT:
         # WIRE (docs/reference/mavlink.md 1): only heartbeats from it keep the ground-station failsafe quiet.
         reason = "the ground station whose heartbeat counts"
-        wanted = (*_ARDUPILOT, Needed("SYSID_MYGCS", our_system, reason, aliases=("MAV_GCS_SYSID",)))
+        rows = (_RECEIVES if receives and row.name == LOSS else row for row in _ARDUPILOT)
+        wanted = (*rows, Needed("SYSID_MYGCS", our_system, reason, aliases=("MAV_GCS_SYSID",)))
     return _overridden(wanted, overrides or {})
 
 
@@ -144,7 +162,7 @@ def _overridden(wanted: Iterable[Needed], overrides: Mapping[str, float]) -> tup
         name = next((n for n in need.names if n in left), None)
         if name is not None:
             value, reason = left.pop(name), "as the field file says"
-            need = replace(need, value=value, reason=reason, accepted=None, others=(), flown=None)
+            need = replace(need, value=value, reason=reason, accepted=None, others=(), flown=None, bits=0)
         found.append(need)
     for name, value in left.items():
         kind = INT32 if value == round(value) else REAL32

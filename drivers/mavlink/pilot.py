@@ -12,7 +12,7 @@ _CERTAIN_NS = 1_500 * NS_PER_MS
 
 
 class LandingPilot:
-    """Detects a landing by a pilot; transmitter: the vehicle receives one."""
+    """Detects a landing by a pilot; transmitter: the vehicle receives one, and would tell its loss."""
 
     def __init__(self, flavour: Flavour) -> None:
         self.transmitter = False

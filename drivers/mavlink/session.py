@@ -8,13 +8,14 @@ for its answer.
 
 from collections import Counter, deque
 from collections.abc import Mapping
+from functools import partial
 
 from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import GlobalOrigin
 from drivers.mavlink.stream_rates import StreamRates
 from drivers.mavlink.wire import service, telemetry
-from drivers.mavlink.wire.flight import OdometryMessage, command_to
+from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import Message, id_of
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavCmd
 from drivers.mavlink.wire.parameters import value_from_carried
@@ -34,40 +35,19 @@ _SLOW_TOLD_NS = 30 * NS_PER_S
 _PARAM_BURST = 4
 _PARAM_TRIES = 20
 _ORIGIN_TRIES_PX4 = 5
-_STOPPED = 0.0
 _CHECKED_WITH = "PX4 1.16 or ArduCopter 4.6"
 _VERSION_PERIOD_NS, _VERSION_TRIES = NS_PER_S, 5
 # After this many unanswered requests a parameter is also requested by its other names.
 _ALIAS_AFTER = 3
 
 
-def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
-    """Return the messages to request and their rates [Hz]; `_STOPPED` for unused ones that come unrequested."""
-    imu = telemetry.HighresImu if flavour is Flavour.PX4 else telemetry.RawImu
-    wanted: dict[type[Message], float] = {
-        telemetry.ExtendedSysState: 5.0,
-        telemetry.LocalPositionNed: odometry_hz,
-        telemetry.AttitudeQuaternion: odometry_hz,
-        telemetry.SysStatus: 2.0,
-        telemetry.BatteryStatus: 1.0,
-    }
-    if imu_hz > 0:
-        wanted[imu] = imu_hz
-    if flavour is Flavour.ARDUPILOT:
-        wanted[telemetry.EkfStatusReport] = 5.0
-    else:
-        # WIRE (docs/reference/mavlink.md 2): unrequested, PX4 sends 100 and 30 of these a second; of the latter only
-        # the covariances are of use. Its ESTIMATOR_STATUS comes every second or two unless requested.
-        wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: 5.0, telemetry.EstimatorStatus: 5.0}
-    return wanted
-
-
 class MavlinkSession:
     """The requests still to be made of one vehicle; starts over after a silence of 2 s, or when its clock began anew.
 
     problems: parameters that forbid a take-off. detail: the awaited step, or "". notes: for the operator; drained by
-    the driver. overrides: parameters set by the field file. pinned: the serial number of the only vehicle that may take
-    off, "" for any. called: whether we call it at its address, rather than it us.
+    the driver. tells_lost_transmitter: as far as is known. overrides: parameters set by the field file. pinned: the
+    serial number of the only vehicle that may take off, "" for any. called: whether we call it at its address, rather
+    than it us.
     """
 
     def __init__(
@@ -77,8 +57,11 @@ class MavlinkSession:
         self._advice = "; if it calls this computer, it needs mavlink.listen: true" if called else ""
         self._pinned, self._serial_number = pinned.upper(), ""
         self._system, self._flavour, self._rates, self._origin = system, flavour, rates, origin
-        self._needed = parameters.needed(flavour, our_system, overrides)
-        self._by_name = {name: n for n in self._needed for name in n.names}
+        self._needs = partial(parameters.needed, flavour, our_system, overrides)
+        self._receives = False
+        # Kept through a silence: a pilot who flies then is one still.
+        self.tells_lost_transmitter = flavour is Flavour.PX4
+        self._know(self._needs())
         self.notes: deque[str] = deque(maxlen=8)
         if warning := parameters.overridden(flavour, overrides or {}):
             self.notes.append(warning)
@@ -98,6 +81,9 @@ class MavlinkSession:
         self._has_origin = False
         self._origin_tries = 0
         self._next_origin_ns = self._next_param_ns = self._next_heartbeat_ns = 0
+
+    def _know(self, needed: tuple[parameters.Needed, ...]) -> None:
+        self._needed, self._by_name = needed, {name: n for n in needed for name in n.names}
 
     @property
     def problems(self) -> list[str]:
@@ -179,10 +165,21 @@ class MavlinkSession:
             value = value_from_carried(self._flavour, message.param_value, message.param_type)
             before = self._found.get(message.param_id, value)
             self._found[message.param_id], self._comparison = value, None
+            if message.param_id == parameters.LOSS:
+                self.tells_lost_transmitter = value != 0
             wanted = self._by_name[message.param_id]
             if value != before:
                 self._note_change(wanted, message.param_id, before, value)
             self._note_doubtful(wanted, {message.param_id: value})
+
+    def hear_transmitter(self) -> None:
+        """Note that an ArduPilot receives a transmitter: it can, and has to, tell the loss of it."""
+        if self._receives:
+            return
+        self._receives, self._comparison = True, None
+        self._know(self._needs(receives=True))
+        if parameters.LOSS in self._found:
+            self._note_doubtful(self._by_name[parameters.LOSS], self._found)
 
     def _note_change(self, wanted: parameters.Needed, name: str, before: float, value: float) -> None:
         """Report a value that somebody else changed: autopilots report it on all their links."""

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from drivers.mavlink.greeting import calls_us, first_heartbeat
 from drivers.mavlink.identity import other_flavour
@@ -10,9 +11,12 @@ from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour
+from drivers.mavlink.wire.flight import command_to
+from drivers.mavlink.wire.frames import id_of
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, MavCmd, SensorBits
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
 from drivers.mavlink.wire.service import ParamRequestRead, ParamSet, ParamValue
+from drivers.mavlink.wire.telemetry import SysStatus
 from groundstation.errors import DriverError
 
 _TRIES = 5
@@ -37,7 +41,7 @@ class ParameterSetup:
         overrides: Mapping[str, float] | None = None, settings: LinkSettings | None = None,
     ) -> None:  # fmt: skip
         self._link, self._system, self._flavour, self._settings = link, system, flavour, settings
-        self._needed = needed(flavour, our_system, overrides)
+        self._needed = partial(needed, flavour, our_system, overrides)
         # From its answer: the name, and the encoding.
         self._answers: dict[str, ParamValue] = {}
 
@@ -73,11 +77,25 @@ class ParameterSetup:
 
     def differences(self) -> Iterator[ParameterDifference]:
         """Yield the differences from the needed values."""
-        for wanted in self._needed:
+        for wanted in self._needed(self._flavour is Flavour.ARDUPILOT and self._receives()):
             value = self._read(wanted)
             text = difference(wanted, {} if value is None else {wanted.name: value})
             if text and not (value is None and wanted.optional):
-                yield ParameterDifference(wanted, value, text)
+                yield ParameterDifference(wanted.mending(value), value, text)
+
+    def _receives(self) -> bool:
+        """Return whether it says that it has received a transmitter since its start."""
+        # WIRE (GCS.cpp): an ArduPilot's receiver is present from the transmitter's first word on, and healthy until
+        # the failsafe of FS_THR_ENABLE.
+        asked = command_to(self._system, MavCmd.REQUEST_MESSAGE, float(id_of(SysStatus)))
+        for _ in range(_TRIES):
+            self._link.send(self._system, asked)
+            deadline = time.monotonic() + _ANSWER_S
+            while time.monotonic() < deadline:
+                for _, frame in self._link.receive():
+                    if frame.system == self._system and isinstance(frame.message, SysStatus):
+                        return bool(frame.message.onboard_control_sensors_present & SensorBits.RC_RECEIVER)
+        return False
 
     def apply(self, wanted: Needed) -> bool:
         """Write one parameter; returns whether the vehicle confirmed it."""

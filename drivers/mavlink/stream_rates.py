@@ -1,4 +1,4 @@
-"""Notices streams that come far more seldom than they were granted, and when to request them again. Pure.
+"""The rates of streams: those to request, those that come far more seldom, and when to request them again. Pure.
 
 WIRE (ArduCopter 4.7): a REQUEST_DATA_STREAM of another station on the same link changes the rates of ours.
 """
@@ -7,7 +7,10 @@ from collections import Counter, deque
 from collections.abc import Mapping
 from itertools import pairwise
 
+from drivers.mavlink.wire import telemetry
+from drivers.mavlink.wire.flight import OdometryMessage
 from drivers.mavlink.wire.frames import Message
+from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, LocalPositionNed
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -18,7 +21,29 @@ _STEP_NS, _STEPS = 500 * NS_PER_MS, 4
 _LEAST_SHARE = 0.4
 # A link too narrow for a stream gets no more requests until it has come at its rate once.
 _TRIES = 3
+_STOPPED = 0.0
 _NAMES: dict[type[Message], str] = {LocalPositionNed: "velocity", AttitudeQuaternion: "attitude"}
+
+
+def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
+    """Return the messages to request and their rates [Hz]; `_STOPPED` for unused ones that come unrequested."""
+    imu = telemetry.HighresImu if flavour is Flavour.PX4 else telemetry.RawImu
+    wanted: dict[type[Message], float] = {
+        telemetry.ExtendedSysState: 5.0,
+        telemetry.LocalPositionNed: odometry_hz,
+        telemetry.AttitudeQuaternion: odometry_hz,
+        telemetry.SysStatus: 2.0,
+        telemetry.BatteryStatus: 1.0,
+    }
+    if imu_hz > 0:
+        wanted[imu] = imu_hz
+    if flavour is Flavour.ARDUPILOT:
+        wanted[telemetry.EkfStatusReport] = 5.0
+    else:
+        # WIRE (docs/reference/mavlink.md 2): unrequested, PX4 sends 100 and 30 of these a second; of the latter only
+        # the covariances are of use. Its ESTIMATOR_STATUS comes every second or two unless requested.
+        wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: 5.0, telemetry.EstimatorStatus: 5.0}
+    return wanted
 
 
 class StreamRates:

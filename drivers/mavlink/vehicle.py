@@ -15,8 +15,9 @@ from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.readiness import Readiness
 from drivers.mavlink.reported_flight import ReportedFlight
 from drivers.mavlink.requests import Requests
-from drivers.mavlink.session import MavlinkSession, streams
+from drivers.mavlink.session import MavlinkSession
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
+from drivers.mavlink.stream_rates import streams
 from drivers.mavlink.texts import BootClock, Refusals, Texts
 from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import FIRST_SIGHT_NS, VisionFeed
@@ -216,7 +217,10 @@ class MavlinkVehicle:
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
         landed = self._flight.landed(now_ns, known)
-        self.orders.pilot.transmitter = known.transmitter
+        if known.transmitter and self.flavour is Flavour.ARDUPILOT:
+            self._session.hear_transmitter()
+        # One that may have died unnoticed is no pilot's.
+        self.orders.pilot.transmitter = known.transmitter and self._session.tells_lost_transmitter
         setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, landed, *up)
         messages += self._requests.due(now_ns)
         if setpoint is not None:

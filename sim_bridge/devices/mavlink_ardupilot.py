@@ -16,6 +16,7 @@ _STOPPED_AIDING_S = 15.0
 # Source (mode_land.cpp): a landing by a failsafe holds its place before it descends.
 _LANDS_AFTER_S = 4.0
 _LEVEL = (Mode.STABILIZE, Mode.ALT_HOLD)
+_LANDS = 3  # of FS_THR_ENABLE
 _GCS_ACTIONS = frozenset({1, 3, 5, 7})
 
 
@@ -37,6 +38,12 @@ class ArduCopter(AutopilotFirmware):
         self._paused = False
         self._ground_lost = self._aiding_stopped = False
         self._descends_s: float | None = None
+        self._radio_lost = False
+
+    @property
+    def hears_transmitter(self) -> bool:
+        """WIRE (ArduCopter 4.7, radio.cpp): with FS_THR_ENABLE 0 it never tells that its transmitter was lost."""
+        return self.transmitter or (self.received and not self.parameters["FS_THR_ENABLE"])
 
     def knows(self, mode: int) -> bool:
         """Return whether a mode exists."""
@@ -132,10 +139,17 @@ class ArduCopter(AutopilotFirmware):
         elif self._ground_lost:
             self._ground_lost = False
             self.say(4, "GCS Failsafe Cleared")
+        self._watch_transmitter()
         self._watch_position(self.copter.estimate.aided_s)
         if self._descends_s is not None and self.now_s >= self._descends_s:
             self._descends_s = None
             self.copter.steer(Steering.LAND)
+
+    def _watch_transmitter(self) -> None:
+        if self.received and not self.hears_transmitter and not self._radio_lost:
+            self.say(4, "Radio Failsafe")
+            self._fail_safe() if self.parameters["FS_THR_ENABLE"] == _LANDS else self.enter(Mode.RTL)
+        self._radio_lost = self.received and not self.hears_transmitter
 
     def _watch_position(self, aided_s: float) -> None:
         if aided_s < _EKF_FAILSAFE_S:

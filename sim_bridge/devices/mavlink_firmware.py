@@ -32,7 +32,7 @@ _OK: Answer = (MavResult.ACCEPTED, "")
 class AutopilotFirmware:
     """One autopilot around a body of the world, with overrides by flavour. texts: (severity, line) to send.
 
-    transmitter: it receives a pilot's.
+    transmitter: it receives a pilot's; received: it has done so since its start.
     """
 
     flavour: Flavour
@@ -42,7 +42,7 @@ class AutopilotFirmware:
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters, start_mode: int) -> None:
         self.copter, self.parameters = copter, parameters
-        self.armed = self.transmitter = False
+        self.armed = self.transmitter = self.received = False
         self.mode = start_mode
         self.texts: deque[tuple[int, str]] = deque(maxlen=32)
         self.origin: tuple[int, int, int] | None = None
@@ -153,6 +153,7 @@ class AutopilotFirmware:
     def step(self, now_s: float, ground_silence_s: float) -> None:
         """Watch over time-outs; call it once per tick."""
         self.now_s = now_s
+        self.received = self.received or self.transmitter
         if self.global_position and self.satellites is not None:
             self.satellites.aid(self.copter)
         if not self.armed:
@@ -184,6 +185,11 @@ class AutopilotFirmware:
     def streams(self) -> bool:
         """Return whether setpoints have kept coming for a second."""
         return self.setpoint_age_s < 0.5 and self.now_s - self._stream_s >= 1.0
+
+    @property
+    def hears_transmitter(self) -> bool:
+        """Return whether it says that it receives a transmitter."""
+        return self.transmitter
 
     @property
     def located(self) -> bool:

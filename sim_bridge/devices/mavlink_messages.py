@@ -104,13 +104,14 @@ class Speaker:
             healthy |= SensorBits.VISION_POSITION
         if self._firmware.global_position:
             healthy |= SensorBits.GPS
-        if self._firmware.transmitter:
+        if self._firmware.hears_transmitter:
             healthy |= SensorBits.RC_RECEIVER
         ardupilot = isinstance(self._firmware, ArduCopter)
         if (ardupilot or self._firmware.global_position) and not self._firmware.health_fault():
             healthy |= SensorBits.PREARM_CHECK
         present = healthy | SensorBits.VISION_POSITION | SensorBits.PREARM_CHECK
         if ardupilot:
+            present |= SensorBits.RC_RECEIVER if self._firmware.received else 0
             # WIRE (ArduPilot, GCS.cpp): a fence that does not exist is healthy; else MAVProxy reports a breach.
             healthy |= SensorBits.GEOFENCE
         else:

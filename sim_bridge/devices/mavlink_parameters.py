@@ -75,6 +75,7 @@ _COPTER_FACTORY: dict[str, float] = {
     "LAND_SPEED": 50,
     "FS_EKF_ACTION": 1,
     "FS_THR_ENABLE": 1,
+    "RC_OPTIONS": 32,
     "BATT_FS_LOW_ACT": 0,
     "BATT_FS_CRT_ACT": 0,
     "FS_OPTIONS": 16,
@@ -109,6 +110,7 @@ _COPTER_INDOOR: dict[str, float] = {
     "LAND_SPEED": 70,
     "FS_OPTIONS": 0,
     "FS_THR_ENABLE": 0,
+    "RC_OPTIONS": 34,
 }
 
 

@@ -45,7 +45,8 @@ EVIDENCE: dict[Condition, str] = {
     Condition.UNCONVERGED: "setpoints that say so",
     Condition.STRAYS: "reported or estimated velocity against what was commanded; up and down only the estimated one",
     Condition.TOO_FAST: "reported or estimated speed above 1.3 `limits.max_speed_m_s` + 0.2 m/s",
-    Condition.FLOWN_TOO_FAST: "likewise in a mode that is not ours, unless a pilot's sticks move it (MAVLink)",
+    Condition.FLOWN_TOO_FAST: "likewise, or a climb as fast, in a mode that is not ours, unless a pilot's "
+    "sticks move it (MAVLink)",
     Condition.CROWDED: "the estimates of it and of another that flies and does not land are nearer to each other than "
     "`safety.min_separation_m`, by more than two standard deviations, and it is the lower one; of two as high as each "
     "other (0.2 m) the later one by name",

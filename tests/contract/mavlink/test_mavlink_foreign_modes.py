@@ -38,6 +38,7 @@ _PLACES = {Flavour.PX4: px4_mode(Px4Main.POSITION), Flavour.ARDUPILOT: CopterMod
 def moved_on(rig, mode, speed_m_s, transmitter=False):
     """Have others fly it in a mode for 4 s; return whether it was landed."""
     firmware = rig.emulator.firmware
+    firmware.parameters.values["FS_THR_ENABLE"] = 3
     rig.track_on()
     firmware.transmitter = transmitter
     rig.run(1.0)
@@ -67,6 +68,7 @@ def test_a_pilot_who_moves_it_by_sticks_may_be_fast_while_a_transmitter_is_heard
 
 def test_a_pilot_may_stop_it_from_speed_by_a_mode_that_holds_its_place(rig):
     firmware = rig.emulator.firmware
+    firmware.parameters.values["FS_THR_ENABLE"] = 3
     rig.track_on()
     firmware.transmitter = True
     rig.run(1.0)
@@ -140,6 +142,7 @@ def test_a_deaf_and_silent_ardupilot_gets_no_heartbeats_and_so_lands_by_itself(r
     """As one whose system id was changed: it hears heartbeats, which are for all, but no order."""
     rig = rig_of("ardupilot")
     firmware, send = rig.emulator.firmware, rig.link.send
+    firmware.parameters.values["FS_THR_ENABLE"] = 3
     rig.track_on()
     if pilot:
         firmware.transmitter = True

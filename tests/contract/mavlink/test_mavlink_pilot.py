@@ -15,6 +15,12 @@ def landings(rig) -> int:
     return sum(m.command == MavCmd.NAV_LAND for _, m in rig.sent(CommandLong))
 
 
+@pytest.fixture(autouse=True)
+def told_when_lost(rig):
+    """As `groundstation mavlink setup` writes it where a transmitter is received."""
+    rig.emulator.firmware.parameters.values["FS_THR_ENABLE"] = 3
+
+
 def take_over(rig, mode):
     rig.track_on()
     rig.emulator.firmware.transmitter = True
@@ -51,6 +57,31 @@ def test_it_is_landed_once_the_transmitter_is_silent(rig):
     rig.emulator.firmware.transmitter = False
     rig.run(1.5)
     assert landings(rig)
+
+
+def test_a_vehicle_whose_lost_transmitter_nothing_tells_has_no_pilot(rig_of):
+    """A real ArduCopter climbed at 4.7 m/s without end: its receiver counts as healthy with FS_THR_ENABLE 0."""
+    rig = rig_of("ardupilot")
+    firmware = rig.emulator.firmware
+    firmware.parameters.values["FS_THR_ENABLE"] = 0
+    take_over(rig, CopterMode.ALT_HOLD)
+    firmware.transmitter = False
+    for turn in range(400):
+        if firmware.mode == CopterMode.ALT_HOLD:
+            rig.copter.fly((0.0, 0.0, min(4.0, 0.02 * turn)), 0.0)
+        rig.run(0.01)
+    assert rig.mode == "LANDING" and landings(rig) and firmware.mode == firmware.landing
+    assert "m/s, 0.6 are allowed, not by our orders" in rig.host.watchdog.reason
+    assert sum("FS_THR_ENABLE is 0, needs 3" in text for text in rig.texts) == 1
+
+
+def test_an_ardupilot_that_tells_the_loss_lands_by_itself(rig_of):
+    rig = rig_of("ardupilot")
+    rig.emulator.firmware.parameters.values["FS_THR_ENABLE"] = 3
+    take_over(rig, CopterMode.ALT_HOLD)
+    rig.emulator.firmware.transmitter = False
+    rig.until(lambda: rig.mode == "LANDING", 2.0)
+    assert "lands by itself" in rig.host.watchdog.reason
 
 
 def test_it_is_landed_in_a_mode_that_needs_a_position(rig):

@@ -97,6 +97,20 @@ def test_setup_tells_and_sets_what_differs(hangar, flavour, drone, system):
     assert "restart" not in run("setup", "--apply", FIELD, drone, *place).output, "it changed nothing"
 
 
+def test_setup_of_a_vehicle_with_a_receiver_lands_it_when_the_transmitter_is_lost(hangar):
+    emulator, _, (address, port) = hangar.add("ardupilot", 12)
+    place = ("--address", f"{address}:{port}")
+    emulator.firmware.parameters.values["RC_OPTIONS"] = 33
+    assert run("setup", "--check", FIELD, "drone_3", *place).output == (
+        "RC_OPTIONS is 33, needs 2 in its sum (the sticks of another ground station would fly it, "
+        "and count as a pilot's)\n"
+    )
+    emulator.firmware.transmitter = True
+    result = run("setup", "--apply", FIELD, "drone_3", *place)
+    assert result.return_value == 0 and "FS_THR_ENABLE is 0, needs 3 (" in result.output
+    assert [emulator.firmware.parameters[name] for name in ("FS_THR_ENABLE", "RC_OPTIONS")] == [3, 35]
+
+
 def test_setup_names_the_system_that_answers_in_place_of_the_wanted_one(hangar):
     _, _, (address, port) = hangar.add("px4", 1)
     result = run("setup", "--check", FIELD, "drone_2", "--address", f"{address}:{port}")

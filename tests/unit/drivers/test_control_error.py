@@ -110,7 +110,7 @@ def test_nobody_is_judged_who_takes_off_lands_or_is_flown_by_a_pilot():
             (None, view(1.0)),
         ):
             judged = monitor.judge(now_ns, said, command, (1.0, 0.0))
-            assert judged.stray == "" and judged.speed_m_s == 0.0
+            assert judged.stray == "" and judged.speed_m_s == 0.0 and judged.seen
 
 
 def test_of_a_vehicle_that_others_fly_only_the_speed_is_judged():
@@ -119,6 +119,14 @@ def test_of_a_vehicle_that_others_fly_only_the_speed_is_judged():
         flown = view(1.5)._replace(foreign=True)
         judged = monitor.judge(round(turn * TURN_S * S), flown, told(), (1.0, 0.0))
         assert judged.stray == "" and judged.speed_m_s == 1.5 and judged.seen
+
+
+@pytest.mark.parametrize(("reported", "seen"), [(4.7, None), (0.0, 4.7)])
+@pytest.mark.parametrize("foreign", [True, False])
+def test_a_climb_that_others_fly_counts_as_its_speed(foreign, reported, seen):
+    flown = view()._replace(foreign=foreign, velocity_m_s=(0.0, 0.0, reported))
+    judged = ControlErrorMonitor().judge(S, flown, told(), (0.0, 0.0), seen)
+    assert judged.speed_m_s == (4.7 if foreign else 0.0)
 
 
 def test_the_speed_is_the_faster_of_what_is_reported_and_seen():

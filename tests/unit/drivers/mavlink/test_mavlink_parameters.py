@@ -119,3 +119,27 @@ def test_returns_that_end_no_offboard_flight_or_come_from_the_factory_fly_with_a
     factory = {"NAV_RCL_ACT": 2, "COM_FLTT_LOW_ACT": 3}[name]
     assert not fault(of(name), {name: factory}) and "climb" in difference(of(name), {name: factory})
     assert not difference(of(name), {name: best})
+
+
+@pytest.mark.parametrize(("value", "written"), [(0, 2), (32, 34), (33, 35), (544, 546)])
+def test_sticks_of_other_ground_stations_are_ignored_and_other_bits_are_kept(value, written):
+    wanted = of("RC_OPTIONS", Flavour.ARDUPILOT)
+    text = fault(wanted, {"RC_OPTIONS": value})
+    assert text.startswith(f"RC_OPTIONS is {value}, needs 2 in its sum (") and "another ground station" in text
+    assert wanted.mending(value).value == written and not fault(wanted, {"RC_OPTIONS": written})
+    assert wanted.takes(wanted.value) and wanted.mending(None).value == wanted.value
+
+
+def test_the_field_file_may_allow_the_sticks_of_ground_stations():
+    assert not fault(of("RC_OPTIONS", Flavour.ARDUPILOT, RC_OPTIONS=32), {"RC_OPTIONS": 32})
+    assert "RC_OPTIONS 32 instead of 2 in its sum" in overridden(Flavour.ARDUPILOT, {"RC_OPTIONS": 32})
+
+
+def test_a_vehicle_that_receives_a_transmitter_has_to_land_when_it_is_lost():
+    (wanted,) = (n for n in needed(Flavour.ARDUPILOT, 255, receives=True) if n.name == "FS_THR_ENABLE")
+    assert wanted.value == 3 and difference(wanted, {"FS_THR_ENABLE": 3}) == ""
+    assert "lost transmitter" in difference(wanted, {"FS_THR_ENABLE": 0})
+    assert not fault(wanted, {"FS_THR_ENABLE": 0}), "it flies, with a warning"
+    assert all("climb" in fault(wanted, {"FS_THR_ENABLE": value}) for value in (1, 2, 4, 5, 6))
+    (said,) = (n for n in needed(Flavour.ARDUPILOT, 255, {"FS_THR_ENABLE": 0}, receives=True) if n.name == wanted.name)
+    assert difference(said, {"FS_THR_ENABLE": 0}) == ""

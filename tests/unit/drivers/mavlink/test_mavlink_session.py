@@ -196,3 +196,25 @@ def test_a_parameter_that_somebody_else_changes_is_told_once_with_its_need() -> 
     assert told.startswith("somebody changed its parameter GUID_TIMEOUT from 0.5 to 10, needs 0.1 to 0.5")
     session.hear_parameter(ParamValue("GUID_TIMEOUT", 0.4, REAL32, 1, 0))
     assert session.notes[-1].endswith("from 10 to 0.4")
+
+
+def test_only_where_the_loss_of_a_transmitter_is_told_is_there_a_pilot() -> None:
+    session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
+    assert not session.tells_lost_transmitter, "as long as it is not known"
+    session.hear_parameter(ParamValue("FS_THR_ENABLE", 3.0, REAL32, 1, 0))
+    session.step(10**12, 0, requests)
+    session.start_over(requests)
+    assert session.tells_lost_transmitter, "a silence does not change it"
+    session.hear_parameter(ParamValue("FS_THR_ENABLE", 0.0, REAL32, 1, 0))
+    assert not session.tells_lost_transmitter
+    assert MavlinkSession(1, Flavour.PX4, {}, 255, GlobalOrigin()).tells_lost_transmitter
+
+
+def test_a_transmitter_whose_loss_is_not_told_is_warned_of_once() -> None:
+    session = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin())
+    session.hear_parameter(ParamValue("FS_THR_ENABLE", 0.0, REAL32, 1, 0))
+    assert not session.notes, "without a receiver it has to be 0"
+    session.hear_transmitter()
+    session.hear_transmitter()
+    (told,) = session.notes
+    assert "FS_THR_ENABLE is 0, needs 3 (" in told and not session.problems

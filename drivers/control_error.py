@@ -78,7 +78,10 @@ class Excess:
             self._obeys_s = 0.0 if self.excess_m >= tolerance.excess_m else self._obeys_s
         else:
             self.excess_m = max(0.0, self.excess_m - tolerance.forgets_m_s * dt_s)
+            strayed = self._obeys_s < tolerance.over_s
             self._obeys_s += dt_s
+            if strayed and self._obeys_s >= tolerance.over_s:
+                self.excess_m = 0.0  # to stray again it has to go as far again
         return self._obeys_s < tolerance.over_s
 
 
@@ -118,16 +121,20 @@ class ControlErrorMonitor:
         for envelope, command in zip(self._envelopes, wanted, strict=True):
             envelope.step(command, dt_s)
         turning = _TURNING_S * abs(told.yaw_rate_rad_s) * math.hypot(*wanted)
-        strays = self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported")
-        strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
-        strays = self._judge_climb(climb_m_s, _RISES_M_S if view.rises else up, dt_s) or strays
+        # All are judged at each turn: while one strays, another may begin to.
+        strays = (
+            self._judge_climb(climb_m_s, _RISES_M_S if view.rises else up, dt_s),
+            self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported"),
+            self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras"),
+        )
+        stray = next(filter(None, strays), "")
         speeds = [0.0 if reported is None else math.hypot(*reported)]
         speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
         if view.foreign:  # others command it, but our limits hold, for a climb too
             self.reset()
-            strays = ""
+            stray = ""
             speeds += [view.velocity_m_s[2] if view.fresh else 0.0, climb_m_s or 0.0]
-        return view._replace(speed_m_s=max(speeds), stray=strays)
+        return view._replace(speed_m_s=max(speeds), stray=stray)
 
     def _judge_one(
         self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,

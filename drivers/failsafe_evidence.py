@@ -185,12 +185,15 @@ class Evidence:
         self._last_ns: int | None = None
         self._waits: dict[Condition, int] = {}
         self._mode: DriverMode | None = None
+        self._strayed_ns: int | None = None  # since the last order
+        self._obeyed = False  # since then
 
     def step(self, at: Situation, limits: WatchdogLimits) -> None:
         """Take the situation of one turn."""
         elapsed_s = 0.0 if self._last_ns is None else at.since_s(self._last_ns)
         self._last_ns = at.now_ns
         before, self.holding = self.holding, observed(at, limits)
+        self._observe_return(at, limits)
         for condition in self.charged_s.keys() - self.holding.keys():
             left_s = self.charged_s[condition] - self._forgets.get(condition, float("inf")) * max(elapsed_s, 1e-9)
             self.charged_s[condition] = left_s
@@ -208,6 +211,16 @@ class Evidence:
             for condition, pardoned_s in self._pardoned_s.items()
             if condition in self.charged_s
         }
+
+    def _observe_return(self, at: Situation, limits: WatchdogLimits) -> None:
+        """Note that it strays once more soon after it began to."""
+        stray = self.holding.get(Condition.STRAYS)
+        if stray is None:
+            self._obeyed = True
+        elif self._strayed_ns is None or at.since_s(self._strayed_ns) >= limits.stray_again_s:
+            self._strayed_ns, self._obeyed = at.now_ns, False
+        elif self._obeyed:
+            self.holding[Condition.STRAYS_AGAIN] = stray
 
     def against_s(self, row: Failsafe) -> float | None:
         """Return how long a row's condition has lasted [s]: since the last order that ends the row, if one does."""
@@ -228,6 +241,8 @@ class Evidence:
         if at.mode is not self._mode:
             self._mode = at.mode
             self.charged_s.pop(Condition.CUT_IGNORED, None)
+        if row is None:
+            self._strayed_ns = None
         self._waits = {}
         if row is None or row.latch is not Latch.RESUME:
             return

@@ -60,6 +60,7 @@ class Condition(StrEnum):
     SETPOINTS_PATCHY = auto()
     UNCONVERGED = auto()
     STRAYS = auto()
+    STRAYS_AGAIN = auto()
     TOO_FAST = auto()
     FLOWN_TOO_FAST = auto()
     CROWDED = auto()
@@ -177,6 +178,9 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  "safety.unseen_land_after_s", modes=FREE),
         Failsafe(Condition.UNLOCATED, land, "no position {why}", limits.lost_land_s, modes=FREE),
         Failsafe(Condition.STRAYS, land, "it does not do what it is told: {why}", limits.stray_land_s, modes=FREE),
+        # Swinging to and fro, it obeys for a moment at each end.
+        Failsafe(Condition.STRAYS_AGAIN, land, "it does not do what it is told, again: {why}",
+                 modes=_HOVER | {DriverMode.HOLD}),
         Failsafe(Condition.TOO_FAST, land, "{why}", limits.fast_land_s, "", SLOWLY, modes=FREE),
         # No order of ours but LAND brakes it, and that late: PX4 goes on for 7 m from 2.3 m/s.
         Failsafe(Condition.FLOWN_TOO_FAST, land, "{why}, not by our orders", limits.fast_brake_s, "", SLOWLY,

@@ -57,7 +57,8 @@ class WatchdogLimits:
     when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise explain while
     at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes (flown by others, lands), for
     fast_resume_s it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands:
-    from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors
+    from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. stray_again_s: within this of a first
+    stray it lands if it strays once more though it hovers. blind_land_s: likewise while its sensors
     are wrong and no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that
     need one.
     crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
@@ -85,6 +86,7 @@ class WatchdogLimits:
     fast_resume_s: float = 0.5
     fast_land_s: float = 1.6
     stray_land_s: float = 1.6
+    stray_again_s: float = 5.0
     blind_land_s: float = 1.6
     lost_hover_s: float = 0.3
     lost_land_s: float = 0.7

@@ -120,7 +120,11 @@ class Orders:
         if self._mode.is_lost(now_ns, guided, armed and action in (Action.FLY, Action.HOVER)):
             self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
         own_climb = action is Action.TAKE_OFF and self._flavour is Flavour.ARDUPILOT
-        if own_climb or decision.failsafe == Condition.STRAYS or not self.are_heeded(now_ns, custom_mode):
+        if (
+            own_climb
+            or decision.failsafe in (Condition.STRAYS, Condition.STRAYS_AGAIN)
+            or not self.are_heeded(now_ns, custom_mode)
+        ):
             self.drift.forget_undershoot()
         match action:
             case Action.TAKE_OFF:

@@ -139,7 +139,7 @@ class Rig:
         self.lingers = False  # the tracker has it on the floor, too
         self.driving = True  # the driver lives
         self.wanted = ((0.0, 0.0, 0.0), 0.0)
-        self.offset_m = (0.0, 0.0, 0.0)
+        self.offset_m, self.turned_rad = (0.0, 0.0, 0.0), 0.0  # errors of the estimate
         self.seen_s = 0.0
         self.epoch = 1
         self.noise_m = 0.01
@@ -191,7 +191,7 @@ class Rig:
             covariance = np.diag([sd**2 + 1e-4 + 0.0014 * self.seen_s] * 3 + [1e-3]).ravel().tolist()
             entities = (
                 EntityEstimate(
-                    name="v", kind="robot", mean=(x, y, z, b.yaw), covariance=tuple(covariance),
+                    name="v", kind="robot", mean=(x, y, z, b.yaw + self.turned_rad), covariance=tuple(covariance),
                     velocity_m_s=(b.vx, b.vy, b.vz), converged=True, age_s=self.seen_s,
                 ),
             )  # fmt: skip

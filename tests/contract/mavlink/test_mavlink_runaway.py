@@ -1,5 +1,7 @@
 """A vehicle that climbs while it believes that it sinks: cameras show it, and a landing that does not help is told."""
 
+import math
+
 import pytest
 
 from groundstation.bus.messages import Severity, Verb
@@ -31,6 +33,14 @@ def test_a_climb_that_only_cameras_see_makes_it_hover_then_land(runaway):
     assert rig.body.z - began_m < 1.7
     rig.until(lambda: rig.mode == "LANDING", 2.0)
     assert rig.host.watchdog.failsafe == "strays"
+
+
+def test_one_whose_heading_is_the_wrong_way_round_lands(rig):
+    """Each correction pushes it further: it swings, and by its report it obeys for a moment at times."""
+    rig.track_on()
+    rig.turned_rad, rig.wanted = math.pi, ((0.3, 0.0, 0.0), 0.0)
+    rig.until(lambda: rig.mode == "HOVER", 2.0)
+    rig.until(lambda: rig.mode == "LANDING", 1.7)
 
 
 def test_a_landing_that_rises_is_told_within_seconds(runaway, monkeypatch):

@@ -90,6 +90,27 @@ def test_camera_observations_reveal_a_wrong_velocity():
     assert fly(lambda t: told(0.3), lambda t: (0.3, 0.0), seen=lambda t: (0.5, 0.15)) == (None, "")
 
 
+def test_one_that_strays_by_its_report_may_begin_to_stray_by_cameras():
+    """There was a gap between the two, after which the time until its landing began anew."""
+    monitor, strays = ControlErrorMonitor(), []
+    for turn in range(200):
+        reported = 1.0 if turn * TURN_S < 2.0 else 0.0
+        judged = monitor.judge(round(turn * TURN_S * S) + S, view(reported), told(action=Action.HOVER), (1.4, 0.0))
+        strays.append(bool(judged.stray))
+    assert all(strays[round(1.0 / TURN_S) :])
+
+
+def test_to_stray_again_it_has_to_go_as_far_again():
+    """A gust at the end of its way back is none of that."""
+    monitor, strays = ControlErrorMonitor(), []
+    for turn in range(400):
+        at_s = turn * TURN_S
+        velocity = 1.0 if at_s < 3.0 else 0.5 if 3.4 < at_s < 3.7 or at_s > 6.0 else 0.0
+        judged = monitor.judge(round(at_s * S) + S, view(velocity), told(action=Action.HOVER), None)
+        strays.append(bool(judged.stray))
+    assert not any(strays[round(3.35 / TURN_S) : round(6.5 / TURN_S)]) and strays[-1]
+
+
 def test_it_is_over_when_the_vehicle_obeys():
     monitor, strays = ControlErrorMonitor(), []
     for turn in range(400):

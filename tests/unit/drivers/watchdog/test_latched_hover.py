@@ -111,3 +111,38 @@ def test_a_tracker_that_paused_moves_nobody_by_itself(new_bench):
 def test_the_failsafes_after_which_it_is_kept_are_rows_of_the_table():
     suspending = {row.condition for row in failsafes(WatchdogLimits()) if row.latch is Latch.RESUME}
     assert KEPT_IN_PLACE - {""} < suspending
+
+
+def test_one_that_strays_again_soon_after_it_was_stopped_for_that_lands(new_bench):
+    bench = new_bench().fly()
+    bench.stray = "1.4 m/s seen by cameras, 0.3 m/s asked"
+    assert set(bench.run(1.0)) == {Action.HOVER}
+    bench.stray = ""
+    assert set(bench.run(1.5)) == {Action.HOVER}
+    bench.stray = "1.3 m/s seen by cameras, 0.0 m/s asked"
+    assert bench.step().action is Action.LAND
+    assert bench.watchdog.failsafe == Condition.STRAYS_AGAIN
+    assert bench.watchdog.reason == f"it does not do what it is told, again: {bench.stray}"
+
+
+def test_one_that_swings_to_and_fro_on_hold_lands(new_bench):
+    bench = new_bench().fly()
+    bench.order(Verb.HOLD)
+    for bench.stray, action in (("1.3 m/s", Action.HOVER), ("", Action.HOVER), ("1.3 m/s", Action.LAND)):
+        assert bench.run(0.7)[-1] is action
+
+
+@pytest.mark.parametrize("ended", ["late", "resumed", "held", "stopped for something else"])
+def test_one_that_strays_much_later_or_after_an_order_has_its_time(new_bench, ended):
+    bench = new_bench().fly()
+    if ended == "stopped for something else":
+        stand_still(bench)
+    else:
+        stray(bench)
+    bench.run(5.1 if ended == "late" else 1.0)
+    if ended in ("resumed", "held"):
+        assert bench.order(Verb.RESUME if ended == "resumed" else Verb.HOLD).stage is AckStage.ACCEPTED
+        bench.run(0.1)
+    bench.stray = "1.3 m/s seen by cameras, 0.0 m/s asked"
+    assert set(bench.run(1.5)) == {Action.HOVER}
+    assert bench.run(0.2)[-1] is Action.LAND and bench.watchdog.failsafe == Condition.STRAYS

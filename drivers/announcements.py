@@ -13,7 +13,7 @@ from groundstation.time_units import NS_PER_S
 
 _UNANSWERED_NS, _UNCONFIGURED_NS = 5 * NS_PER_S, 15 * NS_PER_S
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = NS_PER_S
-NOT_DOWN = "stay away; CUT MOTORS, or the kill switch of its transmitter, lets it fall"
+NOT_DOWN = "stay away; CUT MOTORS, or the kill switch of its transmitter, stops its motors: in the air it falls then"
 _STANDS = frozenset({DriverMode.CONNECTING, DriverMode.LANDED})
 _UNSOUND = "restart it; if it says this again, have that sensor repaired"
 # Refusals caused from outside of this run, in the operator's words.

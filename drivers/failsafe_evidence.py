@@ -44,6 +44,11 @@ class Situation(NamedTuple):
         """Return how long ago a moment was [s]."""
         return (self.now_ns - then_ns) / NS_PER_S
 
+    @property
+    def hears_flight(self) -> bool:
+        """Return whether the vehicle is heard to fly; one whose sensors are wrong is heard all the same."""
+        return bool(self.vehicle.fresh or self.vehicle.unsound) and self.vehicle.flight_state in AIRBORNE
+
 
 def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
     """Return the conditions that hold at this moment, each with its explanation."""
@@ -70,8 +75,11 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
     _observe_state(at, holding)
     _observe_setpoints(at, holding)
     _observe_motion(vehicle, limits, holding)
-    if vehicle.away and at.mode is DriverMode.LANDING and not vehicle.piloted:
-        holding[Condition.FLIES_AWAY] = vehicle.away
+    if at.mode is DriverMode.LANDING and not vehicle.piloted:
+        if vehicle.away:
+            holding[Condition.FLIES_AWAY] = vehicle.away
+        if vehicle.on_floor and at.hears_flight:
+            holding[Condition.STANDS_RUNNING] = ""
     return holding
 
 
@@ -130,9 +138,7 @@ def timed(at: Situation, limits: WatchdogLimits) -> dict[Condition, float]:
     """Return the duration of a condition that has its own time of begin [s]."""
     if at.mode is DriverMode.TAKING_OFF:
         return {Condition.TAKE_OFF_OVERDUE: at.since_s(at.entered_ns)}
-    # One whose sensors are wrong is heard all the same.
-    heard = at.vehicle.fresh or at.vehicle.unsound
-    if at.mode is DriverMode.LANDING and heard and at.vehicle.flight_state in AIRBORNE:
+    if at.mode is DriverMode.LANDING and at.hears_flight and not at.vehicle.on_floor:
         since_s = at.since_s(max(at.entered_ns, at.piloted_ns))
         return {Condition.LANDING_OVERDUE: since_s - at.entered_m / limits.sinks_m_s}
     heard_ns, any_heard_ns = at.gate.last_heard_ns, at.gate.any_heard_ns

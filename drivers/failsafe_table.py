@@ -67,6 +67,7 @@ class Condition(StrEnum):
     ON_FLOOR = auto()
     FLIES_AWAY = auto()
     LANDING_OVERDUE = auto()
+    STANDS_RUNNING = auto()
     DRIVER_STOOD = auto()
     NOT_READY = auto()
     SOMEBODY_NEAR = auto()
@@ -231,9 +232,17 @@ def _alerts(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.FLIES_AWAY, "{why}", limits.away_told_s, EVENLY),
         (Condition.LANDING_OVERDUE, "it should have landed by now", limits.landing_s, None),
     )
-    return tuple(
-        Failsafe(condition, Reaction.TELL, f"it does not come down: {text}", after_s, "", forgets, Latch.NONE, _LANDS)
-        for condition, text, after_s, forgets in rows
+    running = "it stands on the floor with running motors: CUT MOTORS stops them"
+    return (
+        Failsafe(
+            Condition.STANDS_RUNNING, Reaction.TELL, running, limits.stands_told_s, "", EVENLY, Latch.NONE, _LANDS
+        ),
+        *(
+            Failsafe(
+                condition, Reaction.TELL, f"it does not come down: {text}", after_s, "", forgets, Latch.NONE, _LANDS
+            )
+            for condition, text, after_s, forgets in rows
+        ),
     )
 
 

@@ -64,8 +64,9 @@ class WatchdogLimits:
     crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
     by 0.1 m in that time. floor_land_s: likewise on the floor. away_told_s: for so long a landing vehicle rises or
     flies fast before that is told; a healthy one has braked from its take-off in half of it. sinks_m_s, landing_s: the
-    slowest descent, and what a landing takes beyond it. pad_m: where it takes off [x, y; world], if known;
-    min_separation_m: least distance of all airborne vehicles from there, and from it in flight.
+    slowest descent, and what a landing takes beyond it. stands_told_s: it may stand on the floor with running motors
+    before that is told; PX4 notices its landing and stops them within 4 s. pad_m: where it takes off [x, y;
+    world], if known; min_separation_m: least distance of all airborne vehicles from there, and from it in flight.
     """
 
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
@@ -95,6 +96,7 @@ class WatchdogLimits:
     away_told_s: float = 2.0
     sinks_m_s: float = 0.3
     landing_s: float = 5.0
+    stands_told_s: float = 5.0
     pad_m: tuple[float, float] | None = None
     min_separation_m: float = 0.6
 

@@ -6,11 +6,12 @@ from groundstation.bus.messages import AIRBORNE, NOT_DOWN, VehicleStatus
 
 # As drivers end the reason for a hover that only an order ends.
 _NEEDED = "; RESUME is needed"
-_UNCUT = "cut_ignored"
+_UNCUT, _STANDS = "cut_ignored", "stands_running"
 _RESUME = "To do: press RESUME, or HOLD to keep it there"
 
 _STAY_AWAY = "To do: stay away until it is down, it is told to land; CUT MOTORS tries to stop its motors again."
 _CUT = "To do: stay away; press CUT MOTORS, or the kill switch of its transmitter: it falls then."
+_STOP = "To do: stay away; press CUT MOTORS, or the kill switch of its transmitter."
 
 
 class FailsafeWords(NamedTuple):
@@ -32,7 +33,8 @@ def failsafe_words(status: VehicleStatus) -> FailsafeWords | None:
     if status.failsafe == _UNCUT or (status.mode == "CUT" and status.lands_in_s is not None):
         return FailsafeWords("uncut", "flies although its motors were cut", True, _STAY_AWAY)
     if status.failsafe in NOT_DOWN:
-        return FailsafeWords("not down", status.detail.removeprefix("it "), True, _CUT)
+        advice = _STOP if status.failsafe == _STANDS else _CUT
+        return FailsafeWords("not down", status.detail.removeprefix("it "), True, advice)
     why, lands_in_s = status.detail.removeprefix("hovers: ").removesuffix(_NEEDED), status.lands_in_s
     soon = "" if lands_in_s is None else f"starts to land in {max(1, round(lands_in_s))} s"
     if status.detail.endswith(_NEEDED):

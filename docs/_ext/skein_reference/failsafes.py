@@ -6,7 +6,7 @@ from skein_reference.markdown import code, page, prose, table
 
 _INTRODUCTION = """\
 Everything that stops a vehicle without an order, keeps it from starting, or is only reported, because the drone is
-already landing and does not come down.
+already landing and does not come down, or does not stop its motors there.
 Of the rows that apply the first one acts;
 an order of a person (CUT_MOTORS, LAND, HOLD) needs no row. Times are those of the default settings; where a setting
 gives them it stands behind.
@@ -55,8 +55,9 @@ EVIDENCE: dict[Condition, str] = {
     "standard deviations, is 0.1 m or less",
     Condition.FLIES_AWAY: "by cameras it rises faster than 0.3 m/s, or is as fast as for `too_fast` and sinks by no "
     "more than 0.2 m/s",
+    Condition.STANDS_RUNNING: "on the floor as for `on_floor`, and says that it flies",
     Condition.LANDING_OVERDUE: "it says that it flies; since its landing began, less the time for its height then at "
-    "0.3 m/s",
+    "0.3 m/s, and not on the floor as for `on_floor`",
     Condition.DRIVER_STOOD: "more than 0.5 s between two turns of the driver",
     Condition.NOT_READY: "the driver's own reason",
     Condition.SOMEBODY_NEAR: "a vehicle in the air whose estimate, less two standard deviations, is nearer to the pad "

@@ -35,8 +35,9 @@ AIRBORNE = UP | {FlightState.TAKING_OFF, FlightState.LANDING}
 STANDING = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 UNHEARD = frozenset({FlightState.UNKNOWN, FlightState.LOST})
 _ALOFT = frozenset({"HOVER", "TRACK", "HOLD", "LANDING"})
-# Values of VehicleStatus.failsafe of a vehicle that is to land, and does not come down: they end nothing by themselves.
-NOT_DOWN = frozenset({"flies_away", "landing_overdue"})
+# Values of VehicleStatus.failsafe of a vehicle that is to land, and does not come down, or does not stop its motors:
+# they end nothing by themselves.
+NOT_DOWN = frozenset({"flies_away", "landing_overdue", "stands_running"})
 # Values of VehicleStatus.failsafe with which the tracker may bring a hovering vehicle back to its place: none, or one
 # that casts no doubt on what the vehicle does, nor on the tracker.
 KEPT_IN_PLACE = frozenset({"", "driver_stood", "supervisor_silent", "telemetry_silent", "state_unknown"})

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from drivers.mavlink.wire.names import Landed
 from groundstation.bus.messages import Severity, Verb
 from groundstation.bus.topics import VEHICLE_STATUS
 
@@ -67,6 +68,21 @@ def test_a_landing_that_ends_in_no_landing_is_told_once_its_time_is_over(rig):
     rig.run(7.0)
     assert rig.host.watchdog.told == ""
     rig.until(lambda: rig.host.watchdog.told == "landing_overdue", 3.0)
+
+
+def test_one_that_does_not_notice_its_landing_stands_with_running_motors(rig, monkeypatch):
+    """As an ArduCopter may for good after late positions."""
+    rig.track_on()
+    firmware = rig.emulator.firmware
+    monkeypatch.setattr(type(firmware), "landed", Landed.IN_AIR)
+    monkeypatch.setattr(firmware, "disarm_after_s", lambda: 100.0)
+    rig.lingers = True
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.host.watchdog.told, 12.0)
+    rig.run(0.3)
+    status = rig.messages(VEHICLE_STATUS)[-1]
+    assert (status.mode, status.failsafe) == ("LANDING", "stands_running")
+    assert status.detail == "it stands on the floor with running motors: CUT MOTORS stops them"
 
 
 def test_healthy_flights_and_landings_are_not_told(rig):

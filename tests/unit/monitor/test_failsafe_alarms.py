@@ -64,6 +64,15 @@ def test_nobody_is_said_to_look_for_a_target_while_no_drone_tracks(world: World,
     assert (alarm.advice == "Nothing to do: the drones look for it.") == looks and not alarm.asks
 
 
+def test_one_that_stands_with_running_motors_is_not_said_to_fall(world: World) -> None:
+    why = "it stands on the floor with running motors: CUT MOTORS stops them"
+    world.vehicle("drone_1", "LANDING", failsafe="stands_running", detail=why, battery=0.05)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert alarm.text == f"drone_1 {why.removeprefix('it ')}"
+    assert alarm.grave and "CUT MOTORS" in alarm.advice and "fall" not in alarm.advice
+
+
 @pytest.mark.parametrize("failsafe", ["flies_away", "landing_overdue"])
 def test_one_that_does_not_come_down_asks_to_cut_its_motors(world: World, failsafe: str) -> None:
     why = "it does not come down: it rises at 0.9 m/s"

@@ -88,7 +88,7 @@ function orderedBy(who, name, doing) {
 }
 
 const NEEDED = /; RESUME is needed$/;
-const NOT_DOWN = /^it does not come down/;
+const NOT_DOWN = /^it (does not come down|stands on the floor)/;
 // The drone's action until a failsafe lands it.
 const GOES_ON = { TRACK: taskOf, HOLD: () => "hovers", HOVER: () => "hovers" };
 

@@ -56,6 +56,21 @@ def test_one_that_does_not_say_that_it_has_landed_is_told_by_its_height(new_benc
     assert bench.step().mode is DriverMode.LANDED and bench.watchdog.told == ""
 
 
+def test_one_that_stands_on_the_floor_and_does_not_stop_its_motors_is_told_as_that(landing):
+    landing.run(2.0)
+    landing.on_floor = True
+    landing.run(4.9)
+    assert landing.watchdog.told == ""
+    assert set(landing.run(20.0)) == {Action.LAND}
+    assert landing.watchdog.told == Condition.STANDS_RUNNING
+    assert landing.watchdog.explanation == "it stands on the floor with running motors: CUT MOTORS stops them"
+    landing.on_floor = False
+    landing.run(6.0)
+    assert landing.watchdog.told == Condition.LANDING_OVERDUE, "it flies again"
+    landing.on_floor, landing.state = True, FlightState.LANDED
+    assert landing.step().mode is DriverMode.LANDED and landing.watchdog.told == ""
+
+
 def test_a_take_off_that_took_too_long_is_told_if_the_motors_turn_on(new_bench):
     bench = new_bench()
     bench.height = 0.0

@@ -162,6 +162,8 @@ def timed(at: Situation, limits: WatchdogLimits) -> dict[Condition, float]:
 def _why(condition: Condition, at: Situation) -> str:
     if condition is Condition.LEFT_WAITING:
         return at.reason.removesuffix(RESUME_NEEDED)
+    if condition is Condition.TAKE_OFF_OVERDUE and at.vehicle.unarmed:
+        return f": {at.vehicle.unarmed}"
     return at.vehicle.unlocated if condition is Condition.UNLOCATED else ""
 
 

@@ -162,7 +162,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         # Never repeated: a blocked propeller would be spun again and again.
         Failsafe(Condition.TAKE_OFF_REFUSED, land, "it refuses to take off: {why}",
                  modes=frozenset({DriverMode.TAKING_OFF})),
-        Failsafe(Condition.TAKE_OFF_OVERDUE, land, "take-off took too long", limits.take_off_s),
+        Failsafe(Condition.TAKE_OFF_OVERDUE, land, "take-off took too long{why}", limits.take_off_s),
         Failsafe(Condition.TRACKER_SILENT, land, "the tracker sends it no velocity", limits.land_after_s, patience),
         Failsafe(Condition.UNSEEN, land, "the tracker sends it no velocity", limits.unseen_land_after_s,
                  "safety.unseen_land_after_s"),

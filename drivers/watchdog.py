@@ -70,8 +70,7 @@ class Watchdog:
         self._entered_ns = 0
         self._last_step_ns: int | None = None
         self._take_off_ended_ns = 0
-        self._brake_until_ns = 0
-        self._land_until_ns = 0
+        self._brake_until_ns = self._land_until_ns = 0
         self._clearing = False
         self._way_back = WayBack()
         self._passing: Failsafe | None = None
@@ -263,8 +262,7 @@ class Watchdog:
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
         return Situation(
             now_ns, self.mode, self.reason, self.vehicle, self.upstream, self.gate, self._entered_ns,
-            self._take_off_ended_ns, self._clears_in_time(now_ns), gap_s, self._entered_m,
-            self._piloted_ns,
+            self._take_off_ended_ns, self._clears_in_time(now_ns), gap_s, self._entered_m, self._piloted_ns,
         )  # fmt: skip
 
     def _clears_in_time(self, now_ns: int) -> bool:
@@ -280,6 +278,8 @@ class Watchdog:
             self._enter(now_ns, DriverMode.LANDED, "connected")
         elif state is FlightState.LANDED and self.mode in FREE | {DriverMode.LANDING}:
             self._enter(now_ns, DriverMode.LANDED, f"landed ({self.reason})")
+        elif self.vehicle.fell and self.mode in (DriverMode.LANDING, DriverMode.LANDED):
+            self.reason = self.vehicle.fell  # no landing, whatever it said of it on its way
         elif state in UP and self.mode is DriverMode.TAKING_OFF:
             self._enter(now_ns, DriverMode.HOVER, "hovers after its take-off, waiting for TRACK")
 

@@ -121,7 +121,9 @@ class VehicleView(NamedTuple):
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: the mode in which it flies home by itself, or "".
     foreign: others fly it, so that its speed is judged, but not by its commands; piloted: a pilot's sticks may move it.
-    rises: in HOVER it continues to its take-off height. refuses: its answer to the order to take off, if that refused.
+    rises: in HOVER it continues to its take-off height. fell: that it fell since its last start, or "". refuses: its
+    answer to the order to take off, if that refused for good; unarmed: why it does not start its motors yet though it
+    is to take off, in its own words, or "".
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -149,7 +151,9 @@ class VehicleView(NamedTuple):
     foreign: bool = False
     piloted: bool = False
     rises: bool = False
+    fell: str = ""
     refuses: str = ""
+    unarmed: str = ""
 
     @property
     def plausible(self) -> "VehicleView":

@@ -12,7 +12,7 @@ from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.lift_off import LiftOff
 from drivers.mavlink.mode_watch import KEY, STREAM_FIRST_NS, ModeWatch
-from drivers.mavlink.motors import Motors
+from drivers.mavlink.motors import FELL, Motors
 from drivers.mavlink.pilot import LandingPilot
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import VehicleSettings
@@ -58,7 +58,7 @@ class Orders:
         self.pilot = LandingPilot(flavour)
         self.lift = LiftOff()
         self.drift = DriftFeedback()
-        self._motors = Motors()
+        self.motors = Motors()
         self._vehicle, self._flavour, self._requests = vehicle, flavour, requests
         self._guided, self._landing = guided_mode(flavour), land_mode(flavour)
         self._pace = Decimator(vehicle.setpoint_hz)
@@ -120,11 +120,8 @@ class Orders:
         if self._mode.is_lost(now_ns, guided, armed and action in (Action.FLY, Action.HOVER)):
             self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
         own_climb = action is Action.TAKE_OFF and self._flavour is Flavour.ARDUPILOT
-        if (
-            own_climb
-            or decision.failsafe in (Condition.STRAYS, Condition.STRAYS_AGAIN)
-            or not self.are_heeded(now_ns, custom_mode)
-        ):
+        strays = decision.failsafe in (Condition.STRAYS, Condition.STRAYS_AGAIN)
+        if own_climb or strays or not self.are_heeded(now_ns, custom_mode):
             self.drift.forget_undershoot()
         match action:
             case Action.TAKE_OFF:
@@ -144,7 +141,7 @@ class Orders:
             case Action.IDLE:
                 if armed and landed == Landed.ON_GROUND:
                     self._ask(now_ns, "disarming", MavCmd.COMPONENT_ARM_DISARM, 0.0, 0.0)
-                if self._motors.started and now_ns - self._since_ns > _OWN_START_NS:
+                if self.motors.started and now_ns - self._since_ns > _OWN_START_NS:
                     self.events.append((MavSeverity.INFO, "its motors were started, not by us: it will be disarmed"))
             case Action.WAIT:
                 pass
@@ -223,8 +220,8 @@ class Orders:
     def _watch_motors(self, now_ns: int, action: Action, armed: bool) -> None:
         place = self.drift.place(now_ns) if self.lift.lifted else None
         height_m = 0.0 if place is None else place[2] - self._floor_m
-        if self._motors.stop_aloft(now_ns, armed, height_m) and action is not Action.CUT:
-            self.events.append((MavSeverity.ERROR, "its motors were stopped in flight, not by us: it fell"))
+        if self.motors.stop_aloft(now_ns, armed, height_m, cut=action is Action.CUT):
+            self.events.append((MavSeverity.ERROR, FELL))
 
     def start_failed(self, now_ns: int) -> None:
         """Give up a take-off of a vehicle that was started anew meanwhile: its estimator has to settle first."""

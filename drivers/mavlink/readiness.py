@@ -5,7 +5,7 @@ from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import MavlinkSession
 from drivers.mavlink.settling import Settling
 from drivers.mavlink.texts import Texts
-from drivers.mavlink.wire.names import ESTIMATOR_LOCATED, EkfFlag, Flavour, SensorBits
+from drivers.mavlink.wire.names import ARMED, ESTIMATOR_LOCATED, EkfFlag, Flavour, SensorBits
 from groundstation.time_units import NS_PER_S
 
 # ArduPilot repeats its reasons against arming every 30 s.
@@ -19,6 +19,7 @@ class Readiness:
     def __init__(self, flavour: Flavour, session: MavlinkSession, requests: Requests, said: Texts) -> None:
         self._flavour, self._session, self._requests, self._said = flavour, session, requests, said
         self._settling = Settling()
+        self._starts_ns: int | None = None
 
     def why_not(self, now_ns: int, known: LatestTelemetry) -> str:
         """Return the reason that prevents its take-off, in words, or ""."""
@@ -46,3 +47,15 @@ class Readiness:
     def _arming_reason(self, now_ns: int) -> str:
         said = self._said.reasons(now_ns - _COMPLAINTS_NS, "arm", now_ns)
         return f"it does not want to arm{': ' + '; '.join(said) if said else ''}"
+
+    def note_start(self, now_ns: int, starts: bool) -> None:
+        """Note whether it is told to take off now."""
+        self._starts_ns = (now_ns if self._starts_ns is None else self._starts_ns) if starts else None
+
+    def refusal(self, known: LatestTelemetry) -> str:
+        """Return what it said last against starting its motors since it was told to take off, "" once they turn."""
+        if self._starts_ns is None or known.base_mode & ARMED:
+            return ""
+        # WIRE (PX4 1.16): "Preflight Fail: ..." names the fault, "Arming denied: ..." only says that there is one.
+        said = self._said.reasons(self._starts_ns, "preflight") or self._said.reasons(self._starts_ns, "arm")
+        return said[-1] if said else ""

@@ -10,6 +10,7 @@ from drivers.mavlink.commands import Orders
 from drivers.mavlink.convert import LIMITS
 from drivers.mavlink.latest_telemetry import LatestTelemetry
 from drivers.mavlink.links.seam import Heard, MavlinkLink
+from drivers.mavlink.motors import FELL
 from drivers.mavlink.other_stations import GivenOrders, is_answer_to
 from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.readiness import Readiness
@@ -193,7 +194,8 @@ class MavlinkVehicle:
             self._flight.told(now_ns, known), self._flight.is_heard(now_ns, known), battery, not_ready,
             unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, unlocated=self.vision.missed, mute=mute,
             homeward=self._flight.homeward(now_ns, known), foreign=not heeded,
-            piloted=piloted, rises=self.orders.rises(now_ns),
+            piloted=piloted, rises=self.orders.rises(now_ns), fell=FELL if self.orders.motors.fell else "",
+            unarmed=self._readiness.refusal(known),
         )  # fmt: skip
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:
@@ -217,6 +219,7 @@ class MavlinkVehicle:
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
         landed = self._flight.landed(now_ns, known)
+        self._readiness.note_start(now_ns, decision.action is Action.TAKE_OFF)
         if known.transmitter and self.flavour is Flavour.ARDUPILOT:
             self._session.hear_transmitter()
         # One that may have died unnoticed is no pilot's.

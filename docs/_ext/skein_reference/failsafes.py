@@ -31,7 +31,7 @@ EVIDENCE: dict[Condition, str] = {
     Condition.BATTERY_LOW: "battery below `limits.battery_min`",
     Condition.BATTERY_UNKNOWN: "no charge told, or none for 10 s (MAVLink)",
     Condition.TAKE_OFF_REFUSED: "Tello: it answers `error` to `takeoff`",
-    Condition.TAKE_OFF_OVERDUE: "it does not say that it flies",
+    Condition.TAKE_OFF_OVERDUE: "it does not say that it flies; the text ends with a MAVLink vehicle's own reason",
     Condition.TRACKER_SILENT: "no setpoint",
     Condition.TRACKER_RESTARTED: "setpoints of a newer epoch than the authorised one; since the last of that one",
     Condition.UNSEEN: "no setpoint since take-off",

@@ -3,7 +3,7 @@
 import pytest
 
 from drivers.mavlink.wire.flight import CommandLong
-from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Main, px4_mode
+from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, MavResult, Px4Main, px4_mode
 from drivers.mavlink.wire.telemetry import LocalPositionNed
 from groundstation.bus.messages import Verb
 
@@ -129,6 +129,14 @@ def test_motors_that_somebody_stops_in_flight_are_told_as_that(rig):
     rig.emulator.firmware.disarm(FORCE)
     rig.run(2.0)
     assert sum("its motors were stopped" in text and "not by us" in text for text in rig.texts) == 1
+    rig.until(lambda: rig.mode == "LANDED", 8.0)
+    rig.run(0.1)
+    assert rig.host.watchdog.reason == "its motors were stopped in flight, not by us: it fell"
+    rig.order(Verb.TAKEOFF)
+    rig.until(lambda: rig.mode == "HOVER", 12.0)
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.mode == "LANDED", 10.0)
+    assert rig.host.watchdog.reason == "landed (landing for op)"
 
 
 def test_motors_that_stop_after_a_landing_are_not(rig):
@@ -136,3 +144,39 @@ def test_motors_that_stop_after_a_landing_are_not(rig):
     rig.order(Verb.LAND)
     rig.until(lambda: rig.mode == "LANDED", 10.0)
     assert not any("its motors were stopped" in text for text in rig.texts)
+    rig.run(2.0)
+    assert rig.host.watchdog.reason == "landed (landing for op)"
+
+
+def test_motors_that_our_cut_stops_are_not(rig):
+    rig.track_on()
+    rig.run(1.0)
+    rig.order(Verb.CUT_MOTORS)
+    rig.run(4.0)
+    assert not any("its motors were stopped" in text for text in rig.texts)
+    assert rig.host.watchdog.reason == "motors cut by op"
+
+
+@pytest.mark.parametrize(
+    "words", ["Preflight Fail: ekf2 missing data", "Arming denied: Resolve system health failures"]
+)
+def test_a_take_off_that_the_vehicle_refuses_ends_with_its_words(rig, words):
+    rig.connect()
+    firmware = rig.emulator.firmware
+    firmware.arming_fault = lambda: words
+    rig.order(Verb.TAKEOFF)
+    rig.run(3.0)
+    firmware.say(2, "Arming denied: Resolve system health failures")
+    rig.until(lambda: rig.mode == "LANDED", 12.0)
+    assert rig.host.watchdog.reason == f"landed (take-off took too long: {words})"
+
+
+def test_a_refusal_of_an_earlier_take_off_is_none_of_this_one(rig):
+    rig.connect()
+    rig.emulator.firmware.say(2, "Preflight Fail: ekf2 missing data")
+    rig.run(1.0)
+    rig.emulator.firmware.take_off = lambda height_m: (MavResult.DENIED, "")
+    rig.copter.fly = lambda *asked: None
+    rig.order(Verb.TAKEOFF)
+    rig.until(lambda: rig.mode in ("LANDING", "LANDED") and rig.host.watchdog.failsafe, 14.0)
+    assert "take-off took too long" in rig.host.watchdog.reason and "Preflight" not in rig.host.watchdog.reason

@@ -15,6 +15,7 @@ from drivers.ardrone.flow_watch import FlowWatch
 from drivers.ardrone.identity import Model, model_from_navdata
 from drivers.ardrone.latest import FRESH_NS, LatestNavdata
 from drivers.ardrone.link import ArDroneLink, Arrival
+from drivers.ardrone.packet_times import WRAP_S
 from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
@@ -56,11 +57,11 @@ _NO_AR1_VIDEO = Notice(
     "this is an AR.Drone 1.0: its video (UVLC and P264 over UDP 5555) is out of scope and is left alone",
     "take the video section out of the field file and give the drone a camera of its own",
 )
-# Firmware limits tilt to 30 degrees and flies 5 m/s at most. WIRE: the TIME option wraps after 2048 s.
+# Firmware limits tilt to 30 degrees and flies 5 m/s at most.
 # 30 degrees are 6 m/s^2. Between two packets of a recorded flight its velocity changed by 0.024 m/s at most.
 # Our velocity loop is closed over the link: with a velocity older than this it oscillates.
 LIMITS = PlausibilityLimits(
-    speed_m_s=FASTEST_M_S, clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2=6.0, clock_late_s=0.5
+    speed_m_s=FASTEST_M_S, clock_wrap_s=WRAP_S, jump_m_s=0.2, acceleration_m_s2=6.0, clock_late_s=0.5
 )
 _log = logging.getLogger(__name__)
 
@@ -165,7 +166,7 @@ class ArDrone:
             self._attitude.trust()  # else its landing would not be believed either
         if self._flow.lost or self._attitude.blind:
             report = HealthReport((_NO_VELOCITY, *report.findings), report.withheld)
-        self._publisher.publish(now_ns, motion, report)
+        self._publisher.publish(now_ns, motion, report, sample.vehicle_ns)
 
     # -- sender loop --------------------------------------------------------------------------------------------------
 

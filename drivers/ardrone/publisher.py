@@ -2,6 +2,7 @@
 
 from drivers.ardrone.convert import HeadingWatch, NavdataMotion
 from drivers.ardrone.height import HeightWatch
+from drivers.ardrone.packet_times import PacketTimes
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.plausibility.health import ALL_GOOD, SUSPECT_VELOCITY_STD_M_S, Health, HealthReport, Sensor
 from drivers.thinning import Decimator
@@ -38,12 +39,12 @@ class _InertialMean:
 
 
 class NavdataPublisher:
-    """Turns motions into messages stamped with their receipt; the estimator accounts for the delay."""
+    """Turns motions into messages stamped with the drone's time on our clock; the estimator accounts for the delay."""
 
     def __init__(self, settings: ArDroneDriverSettings, bus: Bus) -> None:
         self._name = settings.name
         self._bus = bus
-        self._heading = HeadingWatch()
+        self._times, self._heading = PacketTimes(), HeadingWatch()
         self.heights = HeightWatch()
         self._odometry = Decimator(settings.odometry_hz)
         self._imu, self._inertial = Decimator(settings.imu_hz), _InertialMean()
@@ -57,8 +58,14 @@ class NavdataPublisher:
         """Return whether a motion at that time would be published."""
         return self._odometry.would_be_due(stamp_ns) or self._imu.would_be_due(stamp_ns)
 
-    def publish(self, stamp_ns: int, motion: NavdataMotion, health: HealthReport = ALL_GOOD) -> None:
-        """Publish due data that is not BAD; all motions are checked for jumps of the heading."""
+    def publish(
+        self, arrival_ns: int, motion: NavdataMotion, health: HealthReport = ALL_GOOD, drone_ns: int | None = None
+    ) -> None:
+        """Publish due data that is not BAD; all motions are checked for jumps of the heading.
+
+        drone_ns: time of the motion [drone].
+        """
+        stamp_ns = self._times.date(arrival_ns, drone_ns)
         reset = self._heading.update(stamp_ns, motion)
         sound = motion.height_m is None or self.heights.accept(stamp_ns, motion.height_m)
         all_values = health.of(Sensor.TELEMETRY, Sensor.CLOCK)

@@ -6,7 +6,7 @@ ceiling camera.
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ TAKE_OFF_S, ALOFT_S, JUDGED_FROM_S, FOUND_S = 4.3, 6.0, 9.0, 3.0
 FRAME_S, TICK_S, STATUS_S = 1 / 15, 0.02, 0.2
 VIDEO_LATE_S = {CEILING: 0.06, DRONE: 0.12}
 SEEN_M = 2.5
+STALLS, STALL_S, BURST_S = 26, 0.15, 0.0002
 TARGET_M, TARGET_YAW_RAD, TARGET_HEIGHT_M = (1.0, -1.9), 0.4, 0.1
 # Standard deviations of position [m], [m per square metre of range], and heading [rad]: the planner's.
 NOISE = {CEILING: (0.015, 0.0, 0.035), DRONE: (0.02, 0.004, 0.05)}
@@ -83,6 +84,17 @@ def read_recording(folder: Path) -> Recording:
     return Recording(arrays, angles)
 
 
+def stalled(recording: Recording) -> Recording:
+    """Return the recording over a link that stalls: what it holds up arrives at once, in the order of sending."""
+    sent_s = recording.arrays["nav_time_s"]
+    arrivals_s = sent_s.copy()
+    for begun_s in np.linspace(ALOFT_S, recording.end_s - STALL_S, STALLS).tolist():
+        held = np.flatnonzero((sent_s >= begun_s) & (sent_s < begun_s + STALL_S))
+        arrivals_s[held] = begun_s + STALL_S + BURST_S * np.arange(len(held))
+    arrivals_s = np.maximum.accumulate(arrivals_s)
+    return replace(recording, arrays={**recording.arrays, "nav_time_s": arrivals_s, "drone_time_s": sent_s})
+
+
 class _Published:
     """A bus that records a driver's messages."""
 
@@ -100,6 +112,7 @@ class _Published:
 def driver_messages(recording: Recording, inertial: bool = True) -> list[tuple[float, Message]]:
     """Return the messages of the AR.Drone's driver, with times of arrival; inertial False: navdata in demo mode."""
     a, bus = recording.arrays, _Published()
+    drone_s = a.get("drone_time_s", a["nav_time_s"])
     publisher: Any = NavdataPublisher(ArDroneDriverSettings(name=DRONE, address="10.0.0.1"), bus)  # type: ignore[arg-type]
     arrivals: list[tuple[float, Message]] = []
     for i, t in enumerate(a["nav_time_s"].tolist()):
@@ -114,7 +127,7 @@ def driver_messages(recording: Recording, inertial: bool = True) -> list[tuple[f
             rates_rad_s=tuple(a["imu_gyro_rad_s"][i].tolist()) if inertial else None,
             specific_force_m_s2=tuple((GRAVITY_M_S2 * a["nav_acceleration_g"][i]).tolist()) if inertial else None,
         )
-        publisher.publish(ns(t), motion)
+        publisher.publish(ns(t), motion, drone_ns=round(float(drone_s[i]) * 1e9))
         arrivals += [(t, message) for message in bus.messages]
         bus.messages.clear()
     return arrivals + [(t, _status(bus, t)) for t in np.arange(0.0, recording.end_s, STATUS_S).tolist()]

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.wire import navdata, options
 from drivers.ardrone.wire.navdata import Navdata
+from groundstation.bus.messages import Odometry
 from groundstation.time_units import NS_PER_MS
 
 _SOURCE = ("127.0.0.1", 5554)
@@ -132,3 +134,14 @@ def test_a_drone_that_was_restarted_in_a_pause_is_not_late(drone: ArDrone, pause
         state = _HEALTHY | (_FLY if i > 100 else 0)
         read(drone, timed(i, 11 + pause_s + i * 0.005, clock_s + i * 0.005, state), None)
     assert drone.view(round((13 + pause_s) * 1e9)).unsound == ""
+
+
+def test_messages_are_dated_by_the_drones_clock_over_a_stall_of_the_link(drone: ArDrone) -> None:
+    """What came in a burst was measured over all of the stall; how old it is counts by its arrival."""
+    held, came_s = range(200, 230), 10 + 230 * 0.005
+    arrivals = [timed(i, came_s if i in held else 10 + i * 0.005, 1500 + i * 0.005, _HEALTHY) for i in range(1, 260)]
+    read(drone, *arrivals, None)
+    bus: Any = drone._publisher._bus
+    stamps = [message.header.stamp_ns for message in bus.sent if isinstance(message, Odometry)]
+    assert max(after - before for before, after in pairwise(stamps)) <= 25 * NS_PER_MS
+    assert drone.telemetry.heard_ns == arrivals[-1].stamp_ns

@@ -1,7 +1,8 @@
 """Judges whether a flying vehicle is in our mode, and when to request that mode again. Pure.
 
 WIRE (docs/reference/mavlink.md 5.2): in flight PX4 takes OFFBOARD only while setpoints keep coming, so they come first.
-Its heartbeat, once a second, reports a change of mode late; its answer to the request is there at once.
+Its heartbeat, once a second, reports a change of mode late; its answer to the request is there at once. A PX4 answers
+twice, and the acceptance does not count if a refusal follows (docs/reference/mavlink.md 5.15).
 """
 
 from drivers.mavlink.requests import Requests
@@ -46,8 +47,10 @@ class ModeWatch:
         if guided:
             self._requests.drop(KEY)
             self._ask_until_ns = self._promised_until_ns = 0
-        elif self._ask_until_ns and KEY in self._requests.accepted:
-            self._ask_until_ns, self._promised_until_ns = 0, now_ns + _PROMISED_NS
+        elif KEY not in self._requests.accepted:
+            self._promised_until_ns = 0  # never accepted, or taken back by the second answer
+        elif self._ask_until_ns and not self._promised_until_ns:
+            self._promised_until_ns = now_ns + _PROMISED_NS
         if guided or not is_ours:
             self.guided_ns = now_ns
         late = now_ns - self.guided_ns > _TAKEN_OVER_NS and not self.is_promised(now_ns)
@@ -59,4 +62,4 @@ class ModeWatch:
 
     def asks(self, now_ns: int) -> bool:
         """Return whether to request our mode now."""
-        return self._ask_from_ns <= now_ns < self._ask_until_ns
+        return self._ask_from_ns <= now_ns < self._ask_until_ns and not self._promised_until_ns

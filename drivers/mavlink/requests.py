@@ -11,6 +11,10 @@ _RETRY_NS = 500 * NS_PER_MS
 _TRIES = 4
 _SETTLE_NS = NS_PER_S
 _REFUSED_NS = NS_PER_S
+# WIRE (docs/reference/mavlink.md 5.15): PX4 answers these twice, in either order: its receiver accepts whatever it is,
+# its commander decides. A second answer comes within milliseconds; the rest is for the link.
+_ANSWERED_TWICE = frozenset((MavCmd.DO_SET_MODE,))
+_SECOND_NS = NS_PER_S
 
 
 @dataclass(slots=True)
@@ -30,6 +34,7 @@ class Requests:
         self._system = system
         self._open: dict[str, _Open] = {}
         self._quiet_until_ns: dict[str, int] = {}
+        self._provisional: dict[int, tuple[str, int]] = {}  # by command: key, and until when it may be refused yet
         self.accepted: set[str] = set()
         self.failures: deque[str] = deque(maxlen=16)
 
@@ -47,11 +52,13 @@ class Requests:
         """Drop requests: a landing must not be followed by a late order to climb."""
         for key in keys:
             self._open.pop(key, None)
+            self._provisional = {c: one for c, one in self._provisional.items() if one[0] != key}
 
     def forget(self) -> None:
         """Begin anew, for a restarted vehicle."""
         self._open.clear()
         self._quiet_until_ns.clear()
+        self._provisional.clear()
         self.accepted.clear()
 
     def due(self, now_ns: int) -> list[CommandLong]:
@@ -70,9 +77,13 @@ class Requests:
         return messages
 
     def answer(self, now_ns: int, ack: CommandAckMessage) -> None:
-        """Take an acknowledgement; it belongs to the oldest open request of that command that was sent."""
+        """Take an acknowledgement; it belongs to the oldest open request of that command that was sent.
+
+        A refusal soon after an acceptance takes that back, where a vehicle answers twice.
+        """
         sent = [key for key, r in self._open.items() if r.message.command == ack.command and r.tries]
         if not sent:
+            self._take_second(now_ns, ack)
             return
         key, request = sent[0], self._open[sent[0]]
         if ack.result == MavResult.IN_PROGRESS:
@@ -83,9 +94,21 @@ class Requests:
         self._quiet_until_ns[key] = now_ns + _SETTLE_NS
         if ack.result == MavResult.ACCEPTED:
             self.accepted.add(key)
+            if ack.command in _ANSWERED_TWICE:
+                self._provisional[ack.command] = key, now_ns + _SECOND_NS
         else:
-            self._quiet_until_ns[key] = now_ns + _REFUSED_NS
-            self.failures.append(f"{key}: {word_of(ack.result)}")
+            self._refuse(now_ns, key, ack.result)
+
+    def _take_second(self, now_ns: int, ack: CommandAckMessage) -> None:
+        key, until_ns = self._provisional.get(ack.command, ("", 0))
+        if now_ns < until_ns and ack.result not in (MavResult.ACCEPTED, MavResult.IN_PROGRESS):
+            del self._provisional[ack.command]
+            self.accepted.discard(key)
+            self._refuse(now_ns, key, ack.result)
+
+    def _refuse(self, now_ns: int, key: str, result: int) -> None:
+        self._quiet_until_ns[key] = now_ns + _REFUSED_NS
+        self.failures.append(f"{key}: {word_of(result)}")
 
 
 def word_of(result: int) -> str:

@@ -43,6 +43,7 @@ class Flown:
         self.ms, self.entered_ns, self.action = 0, 1, Action.FLY
         self.asked, self._setpoint_ms = [], 0
         self._beats_ms, self._kept, self._up, self._down = beats_ms, kept, [], []
+        self.refuses_until_ms = 0
 
     def until(self, end_ms):
         while self.ms < end_ms:
@@ -79,10 +80,11 @@ class Flown:
             return
         assert message.command == MavCmd.DO_SET_MODE
         self.asked.append(self.ms)
-        allowed = self.ms - self._setpoint_ms < LOSS_MS
+        allowed = self.ms - self._setpoint_ms < LOSS_MS and self.ms >= self.refuses_until_ms
         self.mode = GUIDED if allowed else self.mode
         result = MavResult.ACCEPTED if allowed else MavResult.TEMPORARILY_REJECTED
-        self._down.append((self.ms + LINK_MS, CommandAckMessage(message.command, result, 0, 0, 255, 190)))
+        for delay_ms, one in ((0, MavResult.ACCEPTED), (TURN_MS, result)):  # its receiver's, and its commander's
+            self._down.append((self.ms + LINK_MS + delay_ms, CommandAckMessage(message.command, one, 0, 0, 255, 190)))
 
     def stopped_and_resumed(self):
         self.until(STOP_MS)
@@ -141,3 +143,21 @@ def test_a_vehicle_that_never_answers_is_left_after_a_while():
     flown._obey = lambda message: None
     flown.until(RESUME_MS + 4_000)
     assert flown.orders.yields and flown.mode == POSITION
+
+
+@pytest.mark.parametrize("beats_ms", range(0, 1000, 100))
+def test_a_px4_whose_receiver_accepts_what_its_commander_refuses_is_asked_again(beats_ms):
+    flown = Flown(beats_ms).stopped_and_resumed()
+    flown.refuses_until_ms = RESUME_MS + 2_000  # the first request comes at 1.2 s, the second a second later
+    flown.until(RESUME_MS + 8_000)
+    assert len(flown.asked) == 2 and list(flown.requests.failures) == ["guided mode: temporarily rejected"]
+    assert flown.mode == GUIDED and not flown.orders.yields
+
+
+def test_a_px4_that_goes_on_refusing_is_left_in_its_mode_with_the_usual_bounds():
+    flown = Flown().stopped_and_resumed()
+    flown.refuses_until_ms = RESUME_MS + 60_000
+    flown.until(RESUME_MS + 3_500)
+    assert flown.orders.yields.startswith("it is in POSITION")
+    flown.until(RESUME_MS + 20_000)
+    assert len(flown.asked) == 2 and flown.mode == POSITION

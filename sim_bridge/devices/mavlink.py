@@ -1,23 +1,28 @@
 """A MAVLink vehicle (PX4 or ArduPilot) at the wire: one UDP port of its own loopback address."""
 
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, id_of, split
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour
+from drivers.mavlink.wire.signature import MAGIC_1
 from drivers.mavlink.wire.verification import Signing
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NEVER_NS, NS_PER_S
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
+from sim_bridge.devices.mavlink_channel import Channel
 from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
 from sim_bridge.devices.mavlink_messages import Speaker
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_px4 import Px4
+from sim_bridge.devices.mavlink_rates import Rates
 from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.devices.mavlink_services import Services
+from sim_bridge.devices.mavlink_time import SenderClock
 from sim_bridge.listening import open_udp
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import TICK_NS
@@ -31,12 +36,11 @@ _CLIENTS = 8
 _TIMESYNC_TICKS = 20
 _LIST_PER_TICK = 2
 _TEXT_SIZE = 50
-_LAST_OLD = 255
 
 
 @dataclass(frozen=True, slots=True)
 class LinkHabits:
-    """one_partner: answers only its first sender; old_until_greeted: MAVLink 1 until it receives MAVLink 2."""
+    """one_partner: answers only its first sender; old_until_greeted: it calls in MAVLink 1 until MAVLink 2 answers."""
 
     one_partner: bool = False
     old_until_greeted: bool = False
@@ -60,24 +64,22 @@ class MavlinkEmulator:
         self.deaf = False
         self.rejected: Counter[str] = Counter()
         system, px4 = parameters.system, parameters.flavour is Flavour.PX4
+        self._system, self._signing, self._stamp = system, signing, 0
         self.firmware: AutopilotFirmware = (Px4 if px4 else ArduCopter)(copter, parameters)
         self.speaker = Speaker(self.firmware)
         self.services = Services(system, self.firmware, self.speaker, video)
-        self._encoder, self._decoder = FrameEncoder(system, AUTOPILOT_COMPONENT, signing), FrameDecoder(signing)
+        self._decoder = FrameDecoder(signing)
         self._calls = calls
-        self._clients: dict[Address, int] = {}
+        self._clients: dict[Address, Channel] = {}
         self._ground_ns: int | None = None
-        self._lists: dict[Address, int] = {}
         self._ticks = self._texts = 0
         self._wrong = wrong or None
         self.habits = LinkHabits()
-        self._greeted = False
         self.socket = open_udp(f"emulated {name}", *address)
 
     def equip(self, satellites: Satellites) -> None:
         """Give it a satellite receiver; call it before the first tick."""
         self.firmware.equip(satellites)
-        self.services.stream_global_position()
 
     @property
     def now_ns(self) -> int:
@@ -101,33 +103,43 @@ class MavlinkEmulator:
     def take(self, data: bytes, source: Address) -> None:
         """Take one datagram; bytes that are no frame, or not signed correctly, are counted."""
         try:
-            for raw in split(data):
+            for raw in split(data, old=True):
+                old = raw[0] == MAGIC_1
                 try:
-                    frame = self._decoder.decode(raw)
+                    frame = self._decoder.decode_old(raw) if old else self._decoder.decode(raw)
                 except WireError as error:
                     self.rejected[error.reason] += 1
                     continue
-                self._take(frame, source)
+                self._take(frame, source, old)
         except WireError as error:
             self.rejected[error.reason] += 1
 
-    def _take(self, frame: ReceivedFrame, source: Address) -> None:
-        self._greeted = True
-        if self.habits.one_partner and self._clients and source not in self._clients:
-            source = next(iter(self._clients))  # it obeys every sender, and answers its partner
-        if source not in self._clients:
-            if len(self._clients) >= _CLIENTS:
-                del self._clients[min(self._clients, key=lambda address: self._clients[address])]
-            self._clients[source] = self.now_ns
-            self._send_to(source, self.speaker.heartbeat())
-        self._clients[source] = self.now_ns
+    def _take(self, frame: ReceivedFrame, source: Address, old: bool) -> None:
+        if self.habits.one_partner and (partners := [a for a, c in self._clients.items() if c.heard_ns is not None]):
+            source = partners[0]  # it obeys every sender, and answers its partner
+        channel = self.channel(source, old)
+        news = not channel.is_heard(self.now_ns, _FORGET_NS)
+        channel.hear(self.now_ns, old)
+        if news:
+            channel.listed = None
+            self._send_to(source, channel, self.speaker.heartbeat())
         message = frame.message
         if isinstance(message, t.Heartbeat) and self._is_ground(frame.system):
             self._ground_ns = self.now_ns
-        if isinstance(message, s.ParamRequestList):
-            self._lists[source] = 0
-        for answer in self.services.take(frame, self.now_ns):
-            self._send_to(source, answer)
+        for answer in self.services.take(frame, self.now_ns, channel):
+            self._send_to(source, channel, answer)
+
+    def channel(self, address: Address, old: bool = False) -> Channel:
+        """Return what it keeps of a client, from now on if that is new; old: it speaks MAVLink 1."""
+        if address not in self._clients:
+            if len(self._clients) >= _CLIENTS:
+                known = [a for a in self._clients if a != self._calls]
+                del self._clients[min(known, key=lambda a: self._clients[a].heard_ns or 0)]
+            encoder = FrameEncoder(self._system, AUTOPILOT_COMPONENT, self._signing)
+            rates = Rates(self.firmware, self.speaker.builders)
+            clock = SenderClock(learns=self.firmware.flavour is not Flavour.PX4)
+            self._clients[address] = Channel(encoder, rates, clock, old)
+        return self._clients[address]
 
     def _is_ground(self, system: int) -> bool:
         mine = self.firmware.parameters.values.get("SYSID_MYGCS")
@@ -142,18 +154,27 @@ class MavlinkEmulator:
         self.firmware.step(now_ns / 1e9, silence_s)
         if self._wrong is not None:
             self.speaker.report(now_ns / 1e9, self._wrong)
-        forgotten = () if self.habits.one_partner else self._clients.items()
-        for client in [c for c, heard_ns in forgotten if now_ns - heard_ns > _FORGET_NS]:
-            del self._clients[client]
-            self._lists.pop(client, None)
-        for kind, every in list(self.services.intervals.items()):
-            if self._ticks % every == 0 and (message := self.speaker.builders[kind]()) is not None:
-                self._send_to_all(message)
+        built: dict[type[Message], Message | None] = {}
+        for address, channel in self._reached():
+            for kind, every in list(channel.rates.intervals.items()):
+                if self._ticks % every == 0:
+                    message = built[kind] if kind in built else built.setdefault(kind, self.speaker.builders[kind]())
+                    if message is not None:
+                        self._send_to(address, channel, message)
+            self._send_list(address, channel)
         if self.firmware.flavour is Flavour.PX4 and self._ticks % _TIMESYNC_TICKS == 0:
             self._send_to_all(s.Timesync(0, now_ns))
         while self.firmware.texts:
             self._say(*self.firmware.texts.popleft())
-        self._send_lists()
+
+    def _reached(self) -> Iterator[tuple[Address, Channel]]:
+        """Yield the clients that it sends to: those heard of late, and the one that it calls."""
+        if self._calls is not None:
+            self.channel(self._calls, self.habits.old_until_greeted)
+        patience_ns = NEVER_NS if self.habits.one_partner else _FORGET_NS
+        for address, channel in list(self._clients.items()):
+            if address == self._calls or channel.is_heard(self.now_ns, patience_ns):
+                yield address, channel
 
     def _say(self, severity: int, text: str) -> None:
         # WIRE (docs/reference/mavlink.md 5.13): pieces of 50 characters. PX4 numbers every text, from 0; the last piece
@@ -169,35 +190,25 @@ class MavlinkEmulator:
             part = text[piece * _TEXT_SIZE : (piece + 1) * _TEXT_SIZE]
             self._send_to_all(t.Statustext(severity, part, number, piece))
 
-    def _send_lists(self) -> None:
+    def _send_list(self, address: Address, channel: Channel) -> None:
+        if (begin := channel.listed) is None:
+            return
         names = self.firmware.parameters.names
-        for client, begin in list(self._lists.items()):
-            for name in names[begin : begin + _LIST_PER_TICK]:
-                self._send_to(client, self.services.parameter(name))
-            self._lists[client] = begin + _LIST_PER_TICK
-            if begin + _LIST_PER_TICK >= len(names):
-                del self._lists[client]
+        for name in names[begin : begin + _LIST_PER_TICK]:
+            self._send_to(address, channel, self.services.parameter(name))
+        channel.listed = begin + _LIST_PER_TICK if begin + _LIST_PER_TICK < len(names) else None
 
     def _send_to_all(self, message: Message) -> None:
-        clients = list(self._clients)
-        if self._calls is not None and self._calls not in self._clients:
-            clients.append(self._calls)
-        if clients and not self.silent:
-            data = self._encode(message)
-            for client in clients if data else ():
-                with suppress(OSError):  # a full buffer or a vanished client loses packets, as radio does
-                    self.socket.sendto(data, client)
+        for address, channel in self._reached():
+            self._send_to(address, channel, message)
 
-    def _send_to(self, client: Address, message: Message) -> None:
-        data = b"" if self.silent else self._encode(message)
+    def _send_to(self, address: Address, channel: Channel, message: Message) -> None:
+        # Times of signing grow over all channels: a client may come back from another port.
+        data = b"" if self.silent else channel.encode(message, self._stamp)
+        self._stamp = max(self._stamp, channel.newest_stamp)
         if data:
-            with suppress(OSError):
-                self.socket.sendto(data, client)
-
-    def _encode(self, message: Message) -> bytes:
-        old = self.habits.old_until_greeted and not self._greeted
-        # WIRE: MAVLink 1 has no numbers beyond 255.
-        return b"" if old and id_of(type(message)) > _LAST_OLD else self._encoder.encode(message, old)
+            with suppress(OSError):  # a full buffer or a vanished client loses packets, as radio does
+                self.socket.sendto(data, address)
 
     def close(self) -> None:
         """Close the port."""

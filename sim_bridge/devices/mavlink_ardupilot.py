@@ -1,10 +1,12 @@
 """ArduCopter 4.6 as a ground station sees it (docs/reference/mavlink.md 1, 5.3)."""
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
+from drivers.mavlink.wire.names import CUSTOM_MODE_ENABLED, Flavour, Landed, MavResult
 from drivers.mavlink.wire.names import CopterMode as Mode
-from drivers.mavlink.wire.names import Flavour, Landed, MavResult
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
+from sim_bridge.devices.mavlink_numbers import byte, whole
 from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.devices.mavlink_setpoints import Velocity, Verdict, read_by_ardupilot
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 _SPOOL_S = 3.3
@@ -26,8 +28,7 @@ class ArduCopter(AutopilotFirmware):
     flavour = Flavour.ARDUPILOT
     guided = Mode.GUIDED
     landing = Mode.LAND
-    frames = frozenset({1, 7, 8, 9})
-    arming_refusal = MavResult.FAILED
+    arming_refusal = mode_refusal = MavResult.FAILED
     disarmed_text = "Disarming motors"
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
@@ -56,8 +57,16 @@ class ArduCopter(AutopilotFirmware):
             return f"Arm: {fault.capitalize()}"
         return "Arm: mode not armable" if self.mode in (Mode.LAND, Mode.RTL, Mode.BRAKE) else ""
 
+    def order_mode(self, params: tuple[float, ...]) -> Answer:
+        """Change the mode; WIRE (ArduPilot 4.5, source): only by a custom mode, which is cut to a whole number."""
+        if not whole(params[0]) & CUSTOM_MODE_ENABLED:
+            return MavResult.DENIED, "no custom mode"
+        return self.set_mode(whole(params[1]))
+
     def set_mode(self, mode: int) -> Answer:
         """Change the mode; those that need a position are refused without one."""
+        if not self.knows(mode):
+            self.say(4, f"No such mode {mode & 0xFF}")
         needs_position = self.knows(mode) and mode not in (*_LEVEL, Mode.LAND, Mode.GUIDED_NOGPS)
         if needs_position and not self.located:
             self.say(4, f"Mode change to {Mode(mode).name} failed: requires position")
@@ -71,10 +80,16 @@ class ArduCopter(AutopilotFirmware):
         self._climb_to_m, self._take_off_s = height_m, self.now_s
         return MavResult.ACCEPTED, ""
 
-    def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """WIRE: an invalid frame or mask makes it stop where it is."""
-        if self.mode == Mode.GUIDED and self.copter.airborne:
+    def read(self, setpoint: SetPositionTargetLocalNed) -> Velocity | None:
+        """Return the velocity of a setpoint; WIRE: an invalid one makes it stop where it is, in GUIDED."""
+        if self.mode != Mode.GUIDED:
+            return None
+        velocity = read_by_ardupilot(setpoint)
+        if not isinstance(velocity, Verdict):
+            return velocity
+        if velocity is Verdict.STOP and self.copter.airborne:
             self.copter.steer(Steering.HOLD)
+        return None
 
     def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
         """Fly a velocity; it ends a take-off, and does not move a standing or paused vehicle."""
@@ -83,11 +98,13 @@ class ArduCopter(AutopilotFirmware):
             self._braked = False
             super().obey(velocity_m_s, turn)
 
-    def pause(self, goes_on: bool) -> Answer:
+    def pause(self, order: float) -> Answer:
         """Hover in GUIDED until the mode is entered anew; WIRE (docs/reference/mavlink.md 5.11)."""
+        if byte(order) > 1:
+            return MavResult.DENIED, "neither pause nor resume"
         if self.mode != Mode.GUIDED:
             return MavResult.FAILED, "not in GUIDED"
-        self._paused = not goes_on
+        self._paused = byte(order) == 0
         if self._paused and self.copter.airborne:
             self.copter.steer(Steering.HOLD)
         return MavResult.ACCEPTED, ""

@@ -8,21 +8,13 @@ import math
 from collections import deque
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
-from drivers.mavlink.wire.names import (
-    FORCE,
-    VELOCITY_AND_YAW,
-    VELOCITY_AND_YAW_RATE,
-    VELOCITY_ONLY,
-    Flavour,
-    Landed,
-    MavResult,
-)
+from drivers.mavlink.wire.names import FORCE, Flavour, Landed, MavResult
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_satellites import Satellites
+from sim_bridge.devices.mavlink_setpoints import Velocity
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 Answer = tuple[MavResult, str]
-_MASKS = frozenset({VELOCITY_AND_YAW_RATE, VELOCITY_AND_YAW, VELOCITY_ONLY})
 _YAW_GAIN = 2.0
 _AIDED_S = 1.0
 _BATTERY_MIN = 0.15
@@ -38,7 +30,6 @@ class AutopilotFirmware:
     flavour: Flavour
     guided: int
     landing: int
-    frames: frozenset[int]
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters, start_mode: int) -> None:
         self.copter, self.parameters = copter, parameters
@@ -70,15 +61,19 @@ class AutopilotFirmware:
     def disarm(self, code: float) -> Answer:
         """Stop the motors; in the air only by force."""
         if self.copter.airborne and code != FORCE:
-            return MavResult.FAILED if self.flavour is Flavour.ARDUPILOT else MavResult.DENIED, "not landed"
+            return self.arming_refusal, "not landed"
         self.armed = False
         self.copter.steer(Steering.OFF)
         return _OK
 
+    def order_mode(self, params: tuple[float, ...]) -> Answer:
+        """Change the mode by the parameters of DO_SET_MODE: base mode, then the mode as the flavour writes it."""
+        raise NotImplementedError
+
     def set_mode(self, mode: int) -> Answer:
         """Change the mode on request."""
         if not self.knows(mode):
-            return MavResult.DENIED, f"mode {mode:#x} unknown"
+            return self.mode_refusal, f"mode {mode:#x} unknown"
         self.enter(mode)
         return _OK
 
@@ -95,45 +90,38 @@ class AutopilotFirmware:
         """Fly to a place, or stop here if none is named; parameters: the seven of the command."""
         return MavResult.UNSUPPORTED, ""
 
-    def pause(self, goes_on: bool) -> Answer:
-        """Pause the mode's motion, or resume it."""
+    def pause(self, order: float) -> Answer:
+        """Pause the mode's motion, 0, or resume it, 1."""
         return MavResult.UNSUPPORTED, ""
 
     def fly(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """Take a setpoint.
-
-        WIRE (docs/reference/mavlink.md 5.1): frames and masks that are not understood are refused aloud.
-        """
-        if setpoint.coordinate_frame not in self.frames or setpoint.type_mask & 0xDFF not in {
-            m & 0xDFF for m in _MASKS
-        }:
-            self.refuse_setpoint(setpoint)
-            return
-        if not all(map(math.isfinite, (setpoint.vx, setpoint.vy, setpoint.vz, setpoint.yaw, setpoint.yaw_rate))):
+        """Take a setpoint."""
+        velocity = self.read(setpoint)
+        if velocity is None:
             return
         if self.now_s - self._setpoint_s > 0.5:
             self._stream_s = self.now_s
         self._setpoint_s = self.now_s
         if self.armed and self.mode == self.guided:
-            self.obey(self._velocity(setpoint), self._turn(setpoint))
+            self.obey(self._velocity(velocity, setpoint.coordinate_frame), self._turn(setpoint))
 
-    def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """Report the fault of a setpoint."""
+    def read(self, setpoint: SetPositionTargetLocalNed) -> Velocity | None:
+        """Return the velocity of a setpoint [its own frame]; one without is answered here, with a text or a stop."""
         raise NotImplementedError
 
-    def _velocity(self, setpoint: SetPositionTargetLocalNed) -> tuple[float, float, float]:
+    def _velocity(self, velocity: Velocity, frame: int) -> Velocity:
         # North-east-down or forward-right-down to the heading frame's forward-left-up.
-        first, second, up = setpoint.vx, -setpoint.vy, -setpoint.vz
-        if setpoint.coordinate_frame in (8, 9):
+        first, second, up = velocity[0], -velocity[1], -velocity[2]
+        if frame in (8, 9):
             return first, second, up
         c, s = math.cos(self.copter.estimate.yaw), math.sin(self.copter.estimate.yaw)
         return c * first + s * second, c * second - s * first, up
 
     def _turn(self, setpoint: SetPositionTargetLocalNed) -> float:
         mask = setpoint.type_mask
-        if not mask & 2048:
+        if not mask & 2048 and math.isfinite(setpoint.yaw_rate):
             return -setpoint.yaw_rate
-        if not mask & 1024:
+        if not mask & 1024 and math.isfinite(setpoint.yaw):
             return _YAW_GAIN * math.remainder(-setpoint.yaw - self.copter.estimate.yaw, math.tau)
         return 0.0
 
@@ -217,7 +205,8 @@ class AutopilotFirmware:
 
     # -- flavours -----------------------------------------------------------------------------------------------------
 
-    arming_refusal = MavResult.DENIED
+    # WIRE (PX4 1.15, ArduPilot 4.5, source): each has one answer to all that it refuses.
+    arming_refusal = mode_refusal = MavResult.TEMPORARILY_REJECTED
     disarmed_text = "Disarmed"
 
     def arming_fault(self) -> str:

@@ -5,7 +5,9 @@ import math
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import Flavour, MavResult, Px4Auto, Px4Main, px4_mode
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
+from sim_bridge.devices.mavlink_numbers import byte
 from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.devices.mavlink_setpoints import Velocity, read_by_px4
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 HOLD = px4_mode(Px4Main.AUTO, Px4Auto.HOLD)
@@ -20,6 +22,10 @@ _SPOOL_S = 1.0
 _CLIMB_M_S, _REACHED_M = 1.0, 0.1
 _LOSS_MODES = {0: POSITION, 1: ALTITUDE, 2: px4_mode(Px4Main.STABILIZED), 4: LAND, 5: HOLD}
 _LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL))
+# Follow a target, precision landing, and modes of companion computers.
+_AUTO_MODES = frozenset(Px4Auto) | {8, 9} | frozenset(range(11, 19))
+# MAV_MODE_FLAG.
+_CUSTOM, _AUTO, _GUIDED, _STABILIZE, _MANUAL = 1, 4, 8, 16, 64
 
 
 class Px4(AutopilotFirmware):
@@ -28,7 +34,6 @@ class Px4(AutopilotFirmware):
     flavour = Flavour.PX4
     guided = OFFBOARD
     landing = LAND
-    frames = frozenset({1, 8})
     disarmed_text = "Disarmed by landing"
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
@@ -64,6 +69,24 @@ class Px4(AutopilotFirmware):
         self._climb_to_m = height
         return MavResult.ACCEPTED, ""
 
+    def order_mode(self, params: tuple[float, ...]) -> Answer:
+        """Change the mode by base mode, main mode and sub-mode.
+
+        WIRE (PX4 1.15, source): a main mode that does not exist is accepted, and changes nothing; so is a base mode
+        that names none. Without a custom mode the flags of the base mode count.
+        """
+        base, main, sub = map(byte, params[:3])
+        if not base & _CUSTOM:
+            wanted = _by_flags(base)
+        elif main == Px4Main.AUTO and sub and sub not in _AUTO_MODES:
+            self.say(2, "Unsupported auto mode")
+            return self.mode_refusal, "no such mode"
+        elif main == Px4Main.AUTO:
+            wanted = px4_mode(main, sub or Px4Auto.MISSION)
+        else:
+            wanted = px4_mode(main) if main in frozenset(Px4Main) else None
+        return (MavResult.ACCEPTED, "") if wanted is None else self.set_mode(wanted)
+
     def set_mode(self, mode: int) -> Answer:
         """Change the mode on request.
 
@@ -95,9 +118,13 @@ class Px4(AutopilotFirmware):
         else:
             self.enter(HOLD)
 
-    def refuse_setpoint(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """Report the fault of a setpoint."""
-        self.say(2, f"SET_POSITION_TARGET_LOCAL_NED invalid coordinate frame {setpoint.coordinate_frame}")
+    def read(self, setpoint: SetPositionTargetLocalNed) -> Velocity | None:
+        """Return the velocity of a setpoint; WIRE (docs/reference/mavlink.md 5.1): one without is refused aloud."""
+        velocity = read_by_px4(setpoint)
+        if isinstance(velocity, str):
+            self.say(2, velocity)
+            return None
+        return velocity
 
     def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
         """Fly, once the propellers are up to speed."""
@@ -132,3 +159,13 @@ class Px4(AutopilotFirmware):
     def disarm_after_s(self) -> float:
         """Return the time on the floor after which the motors stop [s]."""
         return self.parameters["COM_DISARM_LAND" if self.mode == LAND else "COM_DISARM_PRFLT"]
+
+
+def _by_flags(base: int) -> int | None:
+    if base & _AUTO:
+        return px4_mode(Px4Main.AUTO, Px4Auto.MISSION)
+    if not base & _MANUAL:
+        return None
+    if base & _GUIDED:
+        return POSITION
+    return px4_mode(Px4Main.STABILIZED if base & _STABILIZE else Px4Main.MANUAL)

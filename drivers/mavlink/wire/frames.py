@@ -106,8 +106,18 @@ class FrameDecoder:
     def decode(self, frame: bytes) -> ReceivedFrame:
         """Return the message of a verified frame; raises WireError (those of Verifier.verify, malformed)."""
         self._verifier.verify(frame)
-        number = number_of(frame)
-        system, component, sequence = frame[5], frame[6], frame[4]
+        return self._message_of(frame, number_of(frame), (frame[5], frame[6], frame[4]))
+
+    def decode_old(self, frame: bytes) -> ReceivedFrame:
+        """Return the message of a frame of MAVLink 1; raises WireError (those of Verifier.verify_old, malformed).
+
+        Emulated vehicles understand it; no driver does.
+        """
+        self._verifier.verify_old(frame)
+        return self._message_of(frame, frame[5], (frame[3], frame[4], frame[2]))
+
+    def _message_of(self, frame: bytes, number: int, sender: tuple[int, int, int]) -> ReceivedFrame:
+        system, component, sequence = sender
         cls = _BY_ID.get(number)
         if cls is None:
             return ReceivedFrame(system, component, sequence, None)

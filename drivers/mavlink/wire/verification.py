@@ -66,6 +66,12 @@ class Verifier:
         if self._key is not None:
             self._check_time(frame)
 
+    def verify_old(self, frame: bytes) -> None:
+        """Return if a frame of MAVLink 1 is whole; raises WireError (with a key unsigned; those of old_sender)."""
+        system = old_sender(frame)
+        if self._key is not None:
+            raise WireError("unsigned", f"from system {system}")
+
     def _check_time(self, frame: bytes) -> None:
         # WIRE (docs/reference/mavlink.md 5.9): times of one sender on one of its links grow from frame to frame.
         sender = (frame[-SIGNATURE], frame[5], frame[6])

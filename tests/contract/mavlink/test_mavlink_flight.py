@@ -4,6 +4,7 @@ import itertools
 import math
 
 import pytest
+from mavlink_bench import GROUND
 
 from drivers.host import VehicleHost, sleep_serving
 from drivers.mavlink.vehicle import MavlinkVehicle
@@ -106,10 +107,10 @@ def test_a_setpoint_goes_out_when_it_comes_and_not_at_the_next_turn(rig):
 
 def test_px4_is_asked_to_stop_the_streams_that_nobody_uses(rig_of):
     rig = rig_of("px4").connect().run(0.5)
-    assert Attitude not in rig.emulator.services.intervals
-    assert rig.emulator.services.intervals[OdometryMessage] == 40  # 5 Hz, for its covariances
-    assert rig.emulator.services.intervals[LocalPositionNed] == 4
-    assert rig.emulator.services.intervals[EstimatorStatus] == 40  # its doubts are 3 s old at most
+    assert Attitude not in rig.emulator.channel(GROUND).rates.intervals
+    assert rig.emulator.channel(GROUND).rates.intervals[OdometryMessage] == 40  # 5 Hz, for its covariances
+    assert rig.emulator.channel(GROUND).rates.intervals[LocalPositionNed] == 4
+    assert rig.emulator.channel(GROUND).rates.intervals[EstimatorStatus] == 40  # its doubts are 3 s old at most
 
 
 def test_setpoints_are_clamped(rig):
@@ -291,7 +292,7 @@ def test_a_standing_vehicle_that_restarts_within_a_moment_is_asked_for_everythin
     rig.run(8.0)
     before = len(rig.sent(ParamRequestRead))
     speaker, tell, began = rig.emulator.speaker, rig.emulator.speaker.local_position, rig.hand.now
-    rig.emulator.services.intervals = {Heartbeat: 200}
+    rig.emulator.channel(GROUND).rates.intervals = {Heartbeat: 200}
     speaker.builders[LocalPositionNed] = lambda: (
         (m := tell()) and m._replace(time_boot_ms=(rig.hand.now - began) // 1_000_000)
     )

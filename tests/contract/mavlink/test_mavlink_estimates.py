@@ -98,7 +98,7 @@ def test_a_vehicle_whose_estimator_takes_no_positions_is_not_ready(rig_of, flavo
     """WIRE: PX4 sends LOCAL_POSITION_NED with or without a position; ArduPilot only with one."""
     rig = rig_of(flavour)
     feed = rig.emulator.services._vision
-    rig.emulator.services._vision = lambda message, now_ns: None
+    rig.emulator.services._vision = lambda message, now_ns, clock: None
     rig.run(10.0)
     assert rig.vehicle.telemetry.tells_motion(rig.hand.now) == (flavour == "px4")
     assert "no position yet" in rig.host.watchdog.vehicle.not_ready
@@ -113,7 +113,7 @@ def test_a_px4_gets_time_to_settle_from_its_first_position_on(rig_of):
     rig = rig_of("px4")
     rig.emulator.speaker.builders[t.Heartbeat] = lambda: t.Heartbeat(2, Flavour.PX4, 1, rig.emulator.firmware.mode, 0)
     feed = rig.emulator.services._vision
-    rig.emulator.services._vision = lambda message, now_ns: None
+    rig.emulator.services._vision = lambda message, now_ns, clock: None
     rig.run(10.0)
     rig.emulator.services._vision = feed
     rig.run(3.5)

@@ -110,7 +110,7 @@ def test_a_resume_ends_the_pause_of_another_station(rig_of):
     rig.wanted = ((0.3, 0.0, 0.0), 0.0)
     rig.track_on()
     rig.run(3.0)
-    rig.emulator.firmware.pause(goes_on=False)
+    rig.emulator.firmware.pause(0.0)
     rig.until(lambda: "does not do what it is told" in rig.host.watchdog.reason, 9.0)
     rig.run(1.0)
     rig.order(Verb.RESUME)

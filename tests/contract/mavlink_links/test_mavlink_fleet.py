@@ -259,8 +259,9 @@ def test_a_command_that_is_never_answered_is_said_to_be(hangar, kind):
     flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"}, kind)
     try:
         assert flying.turn(10.0, lambda: ready(flying)), flying.hosts[0].watchdog.vehicle.not_ready
-        original = emulator.services._command
-        emulator.services._command = lambda frame, command, p: [] if command == 176 else original(frame, command, p)
+        commands = emulator.services._commands
+        take = commands.take
+        commands.take = lambda frame, asked, rates: [] if asked.command == 176 else take(frame, asked, rates)
         flying.order(Verb.TAKEOFF)
         assert flying.turn(6.0, lambda: any("guided mode: no answer" in t for t in flying.process.texts))
         assert not emulator.firmware.armed

@@ -64,9 +64,9 @@ def heartbeat(link, *systems):
 def noting(take, messages):
     """Return `take` of an emulator's services, which also records the messages."""
 
-    def noted(frame, now):
+    def noted(frame, now, channel):
         messages.append(frame.message)
-        return take(frame, now)
+        return take(frame, now, channel)
 
     return noted
 

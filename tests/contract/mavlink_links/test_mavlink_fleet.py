@@ -246,7 +246,7 @@ def test_a_refused_arming_lists_all_reasons(hangar, kind, flavour):
         flying.order(Verb.TAKEOFF)
         refused = lambda: [t for t in flying.process.texts if "arming: " in t]  # noqa: E731
         assert flying.turn(8.0, refused), flying.process.texts
-        result = "denied" if flavour == "px4" else "failed"
+        result = "temporarily rejected" if flavour == "px4" else "failed"
         assert refused()[0] == f"v9: arming: {result} ({'; '.join(REASONS)})"
         assert not firmware.armed and flying.hosts[0].watchdog.mode in ("TAKING_OFF", "LANDED")
     finally:

@@ -2,7 +2,9 @@
 
 import math
 
-_UNKNOWN_BIAS, _BIAS_DRIFT = math.radians(0.5), 3e-5  # before anything is learnt [rad/s]; [rad/s per root second]
+_UNKNOWN_BIAS = math.radians(0.5)  # before anything is learnt [rad/s]
+# Warming up by 10 degrees in 10 minutes, such a gyroscope drifts by 0.3 degrees per second [rad/s per root second].
+_BIAS_DRIFT = 2e-4
 
 
 class BiasedAngle:

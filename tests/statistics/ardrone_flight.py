@@ -32,6 +32,7 @@ FRAME_S, TICK_S, STATUS_S = 1 / 15, 0.02, 0.2
 VIDEO_LATE_S = {CEILING: 0.06, DRONE: 0.12}
 SEEN_M = 2.5
 STALLS, STALL_S, BURST_S = 26, 0.15, 0.0002
+WARMED_S, WARMED_RAD_S = 15.0, math.radians(0.2)
 TARGET_M, TARGET_YAW_RAD, TARGET_HEIGHT_M = (1.0, -1.9), 0.4, 0.1
 # Standard deviations of position [m], [m per square metre of range], and heading [rad]: the planner's.
 NOISE = {CEILING: (0.015, 0.0, 0.035), DRONE: (0.02, 0.004, 0.05)}
@@ -93,6 +94,13 @@ def stalled(recording: Recording) -> Recording:
         arrivals_s[held] = begun_s + STALL_S + BURST_S * np.arange(len(held))
     arrivals_s = np.maximum.accumulate(arrivals_s)
     return replace(recording, arrays={**recording.arrays, "nav_time_s": arrivals_s, "drone_time_s": sent_s})
+
+
+def warmed(recording: Recording) -> Recording:
+    """Return the recording with a vertical gyroscope whose bias changes in flight."""
+    rates = recording.arrays["imu_gyro_rad_s"].copy()
+    rates[recording.arrays["nav_time_s"] >= WARMED_S, 2] += WARMED_RAD_S
+    return replace(recording, arrays={**recording.arrays, "imu_gyro_rad_s": rates})
 
 
 class _Published:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ardrone_flight import Dark, Recording, figures, fly, read_recording, stalled
+from ardrone_flight import Dark, Recording, figures, fly, read_recording, stalled, warmed
 
 from groundstation.field.resolved import ResolvedField
 
@@ -31,6 +31,14 @@ def test_the_target_is_where_it_is_while_the_ceiling_sees(recording: Recording, 
 def test_stalls_of_the_link_do_not_turn_the_drone(recording: Recording, lab_field: ResolvedField) -> None:
     """What a stall holds up arrives in a burst; dated by arrival, the turns measured meanwhile are lost."""
     found = figures(fly(stalled(recording), lab_field, Dark()).errors)
+    print(found)
+    assert found.target_m <= 0.03
+    assert LEAST_ANEES <= found.target_anees <= MOST_ANEES
+    assert found.heading_nees <= MOST_HEADING_NEES
+
+
+def test_a_gyro_bias_that_changes_in_flight_is_learnt_anew(recording: Recording, lab_field: ResolvedField) -> None:
+    found = figures(fly(warmed(recording), lab_field, Dark()).errors)
     print(found)
     assert found.target_m <= 0.03
     assert LEAST_ANEES <= found.target_anees <= MOST_ANEES

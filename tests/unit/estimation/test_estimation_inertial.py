@@ -117,7 +117,8 @@ def test_the_heading_follows_turns_of_a_leaning_vehicle(flying: Vehicle) -> None
     assert abs(flying.yaw_error_deg(since)) < 0.6
     after = flying.attitude.at(flying.now)
     assert after is not None
-    assert math.degrees(after.yaw_std_rad) < 0.2
+    # 0.1 of the integrated gyro, and in 20 s its bias may have drifted by 0.05 degrees per second.
+    assert 0.2 < math.degrees(after.yaw_std_rad) < 0.3
     assert after.resets == before.resets
 
 

@@ -24,6 +24,9 @@ _INTRUSIONS = {
     "duplicate_system": "frames with its number from a second address (another vehicle, or it was restarted there)",
     "own_id": "heartbeats of another ground station with our system id (give that one another id, or end it)",
     "foreign_address": "datagrams from another address",
+    "second_publisher": "odometry of a second publisher beside the first one, which counts (end the other node)",
+    "heir_in_flight": "odometry of a publisher that took over in flight and does not continue the former one (after"
+    " the landing end all but its own node, then this run)",
     "setpoint_other_source": "setpoints of another sender",
     "setpoint_epoch_leap": "setpoints of an epoch far ahead",
     "overflow": "orders and leases unread, as too many came at once (a member of the run floods it)",

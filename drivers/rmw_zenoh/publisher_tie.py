@@ -17,6 +17,10 @@ class PublisherTie:
         """Return whether this is not the publisher that the topic is tied to."""
         return publisher != self._publisher and not self.silent(now_ns)
 
+    def is_other(self, publisher: bytes) -> bool:
+        """Return whether the topic is tied to another publisher than this, speaking or not."""
+        return self._heard_ns > 0 and publisher != self._publisher
+
     def take(self, publisher: bytes, now_ns: int) -> bool:
         """Tie the topic to a publisher that sent; returns whether it is another one than before."""
         changed = publisher != self._publisher

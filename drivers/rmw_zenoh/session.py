@@ -39,6 +39,7 @@ class RouterSession:
         self._expressions, self._hear, self._joined = expressions, hear, joined
         self._session: Any = None
         self._declared: list[Any] = []
+        self._tokens: set[str] = set()
         self._closing = threading.Event()
         self._joining = threading.Thread(target=self._join, name="ros2", daemon=True)
         self._joining.start()
@@ -51,6 +52,20 @@ class RouterSession:
     def declare(self, token: str) -> None:
         """Announce a node or publisher to the others until the session ends."""
         self._declared.append(self._session.liveliness().declare_token(token))
+
+    def watch(self, expression: str) -> None:
+        """Follow the tokens of others that an expression names; see `nodes`."""
+        liveliness = self._session.liveliness()
+        self._declared.append(liveliness.declare_subscriber(expression, self._follow, history=True))
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Return the names of the nodes that have a watched token, in order."""
+        return tuple(sorted({graph.node_of(token) for token in self._tokens.copy()} - {""}))
+
+    def _follow(self, sample: Any) -> None:
+        change = self._tokens.add if sample.kind == zenoh.SampleKind.PUT else self._tokens.discard
+        change(str(sample.key_expr))
 
     def publisher(self, key: str) -> "Publisher":
         """Return a publisher of a topic's key; the newest message goes first, and none waits for a full line."""
@@ -103,6 +118,7 @@ class RouterSession:
 
     def _leave(self) -> None:
         self._declared.clear()
+        self._tokens.clear()
         if self._session is not None:
             with suppress(zenoh.ZError):
                 self._session.close()

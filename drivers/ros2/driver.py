@@ -17,6 +17,7 @@ from drivers.ros2.flight import FlightWatch, angles_of, fault_of_standing, level
 from drivers.ros2.link import Ros2Link
 from drivers.ros2.names import Order
 from drivers.ros2.settings import FASTEST_M_S, Ros2DriverSettings
+from drivers.ros2.succession import Succession
 from drivers.watchdog_types import REFUSABLE, Action, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
@@ -34,6 +35,7 @@ _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT:
 # A take-off that is called off may still begin for this long after its order; a landing that seems to be over, go on.
 _LASTS_NS = 5 * NS_PER_S
 _ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
+_HEIR = "another publisher took over in flight, "
 LIMITS = PlausibilityLimits(speed_m_s=FASTEST_M_S, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
@@ -51,7 +53,8 @@ class Ros2Vehicle:
         self._said_ns: dict[Order | None, int] = {}
         self._lands_until_ns = 0
         self._heard_ns = self._charge_ns = 0
-        self._tie, self._battery_tie = PublisherTie(), PublisherTie(_CHARGE_NS)
+        self._succession = Succession(settings.limits, settings.ros2.standing_z_m)
+        self._battery_tie = PublisherTie(_CHARGE_NS)
         self._charge, self._rate_hz = 0.0, 0.0
         self._refused, self._standing, self._height_m, self._was_ordered = "", "", 0.0, False
         self._velocity: Vector3 = (0.0, 0.0, 0.0)
@@ -66,16 +69,27 @@ class Ros2Vehicle:
         try:
             if key.rpartition("/")[0] == self._battery_type:
                 self._take_charge(now_ns, payload, publisher)
-            elif self._tie.is_second(publisher, now_ns):
+            elif self._succession.is_second(publisher, now_ns):
                 self._rejected["second_publisher"] += 1
             else:
-                self._take(now_ns, vehicle.decode_odometry(payload))
-                self._tie.take(publisher, now_ns)
-                self._refused = ""
+                self._hear_odometry(now_ns, payload, publisher)
         except WireError as error:
             self._rejected[error.reason.replace(" ", "_")] += 1
             if key.rpartition("/")[0] != self._battery_type:
                 self._refused = error.reason
+
+    def _hear_odometry(self, now_ns: int, payload: bytes, publisher: bytes) -> None:
+        message = vehicle.decode_odometry(payload)
+        flies = self._flight.airborne or self._asked is Action.TAKE_OFF
+        broken = self._succession.break_with(now_ns, publisher, message) if flies else ""
+        if broken:
+            self._rejected["heir_in_flight"] += 1
+            if not self._refused.startswith(_HEIR):
+                self._refused = _HEIR + broken
+            return
+        self._take(now_ns, message)
+        self._succession.take(now_ns, publisher, message)
+        self._refused = ""
 
     def _take_charge(self, now_ns: int, payload: bytes, publisher: bytes) -> None:
         charge = vehicle.decode_charge(payload)
@@ -127,13 +141,24 @@ class Ros2Vehicle:
         scale, (x, y, z) = self._settings.velocity_scale, self._velocity
         state = self._flight.state(self._asked, math.hypot(x, y, z))
         charge = self._charge if known else None
-        not_ready = trouble or self._standing
+        not_ready = trouble or self._standing or self._two_publishers(now_ns)
         return VehicleView(state, fresh, charge, not_ready, not trouble, unsound, (scale * x, scale * y, z))
 
     @property
+    def _odometry(self) -> str:
+        """Return the topic of its odometry, and where it is announced the nodes that publish it."""
+        own = self._settings.ros2
+        nodes = " and ".join(self._link.odometry_nodes)
+        return f"its odometry (/{own.topic(own.odometry)}{nodes and f' of {nodes}'})"
+
+    @property
     def _refusal(self) -> str:
-        topic = self._settings.ros2.topic(self._settings.ros2.odometry)
-        return f"its odometry (/{topic}) is refused: {self._refused}"
+        return f"{self._odometry} is refused: {self._refused}"
+
+    def _two_publishers(self, now_ns: int) -> str:
+        if not self._succession.two_speak(now_ns):
+            return ""
+        return f"{self._odometry} has two publishers, of which the first counts: end the other one"
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send the orders of a decision; the vehicle climbs by itself after a take-off order."""
@@ -191,7 +216,7 @@ class Ros2Vehicle:
         refused = "" if asked is None else self._link.refused.get(asked, "")
         detail = f"it refused to {REFUSABLE[self._asked]}: {refused}" if refused else ""
         if self._flight.airborne and not detail:
-            detail = self._link.trouble or self._unordered
+            detail = self._link.trouble or self._unordered or self._two_publishers(now_ns)
         rate_hz = 0.0 if silent else self._rate_hz
         return LinkHealth(None, rate_hz, dict(self._rejected), detail, self._plausibility.clock.figures)
 

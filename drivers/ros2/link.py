@@ -36,6 +36,7 @@ class Ros2Link:
             session.declare(graph.node_token(section.domain, session.zid, self._node))
             where = (section.domain, session.zid, self._node, 1, f"/{section.topic(section.velocity)}", kind)
             session.declare(graph.publisher_token(*where, velocity.rpartition("/")[2]))
+            session.watch(graph.publishers_key(section.domain, section.topic(section.odometry), vehicle.ODOMETRY))
         self._velocity = session.publisher(velocity)
         for order in Order:
             key = names.order_key(section, order)
@@ -65,6 +66,11 @@ class Ros2Link:
                 what = "service" if section.orders == "services" else "topic"
                 return f"nobody in domain {section.domain} has the {what} /{section.topic(getattr(section, order))}"
         return ""
+
+    @property
+    def odometry_nodes(self) -> tuple[str, ...]:
+        """Return the names of the nodes that announce to publish its odometry."""
+        return self._session.nodes
 
     def fly(self, velocity: vehicle.Vector3, turn_rad_s: float) -> bytes:
         """Send a velocity [m/s, rad/s; base_stabilized]; returns the bytes sent, empty while the router is away."""

@@ -174,5 +174,19 @@ def test_a_second_publisher_is_not_believed_and_what_is_no_message_is_counted() 
         session.put(graph.topic_key(3, "drone_1/battery", vehicle.BATTERY, "RIHS01_x"), b"\0\1\0\0")
         room.until(lambda: {"second_publisher", "short"} <= set(rejected()))
         assert room.state is FlightState.LANDED
+        token = graph.publisher_token(3, "abc", "old_driver", 3, "/drone_1/odom", vehicle.ODOMETRY, "RIHS01_x")
+        announced = session.liveliness().declare_token(token)
+        stray = graph.publisher_token(3, "abc", "other", 4, "/drone_2/odom", vehicle.ODOMETRY, "RIHS01_x")
+        session.liveliness().declare_token(stray)
+        not_ready = lambda: room.driver.view(time.monotonic_ns()).not_ready  # noqa: E731
+        second = (key, vehicle.encode_odometry(aloft, "odom", "x"))
+
+        def told(words: str) -> bool:
+            session.put(*second, attachment=stranger)
+            return words in not_ready()
+
+        room.until(lambda: told("its odometry (/drone_1/odom of /old_driver) has two publishers"))
+        announced.undeclare()
+        room.until(lambda: told("its odometry (/drone_1/odom) has two publishers"))
     finally:
         room.close()

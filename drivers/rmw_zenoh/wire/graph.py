@@ -40,6 +40,20 @@ def publisher_token(domain: int, session: str, node: str, number: int, topic: st
     return f"{entity}/{name}/{dds_type(kind)}/{type_hash}/{_QOS}"
 
 
+def publishers_key(domain: int, topic: str, kind: str) -> str:
+    """Return the key expression of the tokens of all publishers of a topic."""
+    return f"{_ADMIN_SPACE}/{domain}/*/*/*/{_PUBLISHER}/*/*/*/%{topic.strip('/').replace('/', '%')}/{dds_type(kind)}/**"
+
+
+def node_of(token: str) -> str:
+    """Return the full name of the node whose token this is, "" of any other text."""
+    parts = token.split("/")
+    if len(parts) < 9 or parts[0] != _ADMIN_SPACE:
+        return ""
+    namespace, name = parts[7].replace("%", "/").rstrip("/"), parts[8]
+    return f"{namespace}/{name}"
+
+
 def publisher_of(attached: bytes) -> bytes:
     """Return the 16 bytes that name the publisher of a message, or nothing if the message does not name it."""
     return attached[17:33] if len(attached) == 33 else b""

@@ -4,7 +4,7 @@ WIRE (docs/reference/ros2.md 4): types, fields and type hashes.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from drivers.rmw_zenoh.wire.cdr import CdrReader, CdrWriter, WireError
 
@@ -34,7 +34,7 @@ class OdometryMessage:
     """The content of an Odometry.
 
     stamp_ns: on the sender's clock; position [m], quaternion (x, y, z, w) in its frame; velocity [m/s] and turn [rad/s]
-    in the vehicle's own.
+    in the vehicle's own; frames: the names of both.
     """
 
     stamp_ns: int
@@ -42,6 +42,7 @@ class OdometryMessage:
     quaternion: Quaternion
     velocity: Vector3
     turn: Vector3
+    frames: tuple[str, str] = field(default=("", ""), compare=False)
 
 
 def decode_odometry(payload: bytes) -> OdometryMessage:
@@ -52,7 +53,8 @@ def decode_odometry(payload: bytes) -> OdometryMessage:
     """
     reader = CdrReader(payload)
     stamp_ns, frame = reader.header()
-    if reader.text() == frame != "":
+    own_frame = reader.text()
+    if own_frame == frame != "":
         raise WireError("twist in the axes of the room")
     x, y, z, qx, qy, qz, qw = reader.numbers("d", 7)
     reader.numbers("d", _COVARIANCE)
@@ -65,7 +67,7 @@ def decode_odometry(payload: bytes) -> OdometryMessage:
     if abs(size - 1.0) > _QUATERNION_ERROR:
         raise WireError("no rotation")
     turned = (qx / size, qy / size, qz / size, qw / size)
-    return OdometryMessage(stamp_ns, (x, y, z), turned, values[:3], values[3:])
+    return OdometryMessage(stamp_ns, (x, y, z), turned, values[:3], values[3:], (frame, own_frame))
 
 
 def encode_odometry(message: OdometryMessage, frame: str, vehicle_frame: str) -> bytes:

@@ -4,74 +4,14 @@ import math
 from dataclasses import replace
 
 import pytest
+from ros2_node import MS, STANDING, FakeLink, Node
 
 from drivers.rmw_zenoh.wire import vehicle
-from drivers.ros2 import driver as ros2_driver
-from drivers.ros2.driver import Ros2Vehicle
 from drivers.ros2.names import Order
-from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
-from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
-from groundstation.bus import clock
-from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.messages import FlightState, Odometry
-from groundstation.bus.topics import ODOMETRY
 
-MS = 1_000_000
-STANDING = vehicle.OdometryMessage(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 ON_ITS_BACK = (1.0, 0.0, 0.0, 0.0)
-
-
-class FakeLink:
-    """A router with a node that accepts everything."""
-
-    trouble = ""
-
-    def __init__(self, address: str, section: Ros2Section, node: str, hear: object) -> None:
-        self.refused: dict[str, str] = {}
-        self.ordered: list[str] = []
-        self.flown: list[vehicle.Vector3] = []
-
-    def fly(self, velocity: vehicle.Vector3, turn_rad_s: float) -> bytes:
-        self.flown.append(velocity)
-        return b""
-
-    def order(self, order: object) -> bytes:
-        self.ordered.append(str(order))
-        return b""
-
-    def close(self) -> None: ...
-
-
-class Node:
-    """A node that sends the given messages, and the driver that receives them, 20 times a second."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now_ns = 1_000_000_000
-        monkeypatch.setattr(ros2_driver, "Ros2Link", FakeLink)
-        monkeypatch.setattr(clock, "now_ns", lambda: self.now_ns)
-        exchange = MemoryExchange()
-        self.heard = MemoryBus(exchange, "lab", "tracker").subscribe([ODOMETRY])
-        settings = Ros2DriverSettings(
-            name="drone_1", address="127.0.0.1", pad_m=(0.0, 0.0), ros2=Ros2Section(namespace="drone_1")
-        )
-        self.driver = Ros2Vehicle(settings, MemoryBus(exchange, "lab", "drone_1"))
-
-    def say(
-        self, message: vehicle.OdometryMessage, *, frame: str = "odom", own_frame: str = "base_link"
-    ) -> VehicleView:
-        self.now_ns += 50 * MS
-        payload = vehicle.encode_odometry(message, frame, own_frame)
-        self.driver._hear("0/drone_1/odom/nav_msgs::msg::dds_::Odometry_/RIHS01_x", payload, b"publisher-of-it.")
-        return self.driver.view(self.now_ns)
-
-    @property
-    def rejected(self) -> dict[str, int]:
-        return self.driver.health(self.now_ns).rejected
-
-
-@pytest.fixture
-def node(monkeypatch: pytest.MonkeyPatch) -> Node:
-    return Node(monkeypatch)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +29,7 @@ def test_invalid_odometry_is_refused_with_a_reason(node: Node, wrong: vehicle.Od
     for _ in range(20):
         view = node.say(wrong)
     assert not view.fresh and view.flight_state is FlightState.UNKNOWN
-    assert view.silence.endswith(f"its odometry (/drone_1/odom) is refused: {reason}")
+    assert view.silence.endswith(f"its odometry (/drone_1/odom of /drone_1/driver) is refused: {reason}")
     assert node.rejected == {reason.replace(" ", "_"): 20} and not node.heard.drain()
     view = node.say(STANDING)
     assert view.fresh and not view.unsound and all(map(math.isfinite, view.velocity_m_s or ()))

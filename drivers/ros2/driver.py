@@ -13,6 +13,7 @@ from drivers.rmw_zenoh.publisher_tie import PublisherTie
 from drivers.rmw_zenoh.wire import vehicle
 from drivers.rmw_zenoh.wire.cdr import WireError
 from drivers.ros2 import names
+from drivers.ros2.cut_order import CutOrder
 from drivers.ros2.flight import FlightWatch, angles_of, fault_of_standing, levelled
 from drivers.ros2.link import Ros2Link
 from drivers.ros2.names import Order
@@ -36,6 +37,7 @@ _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT:
 _LASTS_NS = 5 * NS_PER_S
 _ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
 _HEIR = "another publisher took over in flight, "
+_UNTOLD = "without odometry nothing tells whether its motors stopped; stay away"
 LIMITS = PlausibilityLimits(speed_m_s=FASTEST_M_S, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
@@ -52,6 +54,7 @@ class Ros2Vehicle:
         self._asked = Action.WAIT
         self._said_ns: dict[Order | None, int] = {}
         self._lands_until_ns = 0
+        self._cut_order = CutOrder()
         self._heard_ns = self._charge_ns = 0
         self._succession = Succession(settings.limits, settings.ros2.standing_z_m)
         self._battery_tie = PublisherTie(_CHARGE_NS)
@@ -165,10 +168,11 @@ class Ros2Vehicle:
         if decision.action is not self._asked:
             self._asked = decision.action
             self._said_ns.clear()
+            self._cut_order = CutOrder()
             self._was_ordered |= self._asked is Action.TAKE_OFF
         match decision.action:
             case Action.CUT:
-                self._cut(now_ns)
+                self._cut(now_ns, decision.entered_ns)
             case Action.LAND:
                 self._lands_until_ns = now_ns + _LASTS_NS
                 self._order(now_ns, Order.LAND)
@@ -187,10 +191,14 @@ class Ros2Vehicle:
     def _fly(self, now_ns: int, velocity: Vector3, turn_rad_s: float) -> None:
         self._note(now_ns, self._settings.ros2.velocity, self._link.fly(velocity, turn_rad_s))
 
-    def _cut(self, now_ns: int) -> None:
-        # If that order is a switch, a second one would undo it.
-        if self._flight.airborne or Order.CUT not in self._said_ns:
-            self._order(now_ns, Order.CUT)
+    def _cut(self, now_ns: int, order_ns: int) -> None:
+        link, order, height_m = self._link, self._cut_order, self._height_m
+        accepted = Order.CUT in link.accepted
+        if order.is_due(now_ns, order_ns, self._heard_ns, height_m, accepted) and self._is_due(now_ns, Order.CUT):
+            payload = link.order(Order.CUT)
+            self._note(now_ns, self._settings.ros2.cut, payload)
+            if payload and link.is_taken(Order.CUT):
+                order.sent(now_ns, order_ns, height_m)
         # A node that has no such order must not fly on at its last velocity.
         if self._flight.airborne or self._is_due(now_ns, None):
             self._fly(now_ns, (0.0, 0.0, 0.0), 0.0)
@@ -215,6 +223,8 @@ class Ros2Vehicle:
         asked = _ORDERS.get(self._asked)
         refused = "" if asked is None else self._link.refused.get(asked, "")
         detail = f"it refused to {REFUSABLE[self._asked]}: {refused}" if refused else ""
+        if asked is Order.CUT and silent and self._cut_order.was_sent:
+            detail = detail or f"/{self._settings.ros2.topic(self._settings.ros2.cut)} was sent once: {_UNTOLD}"
         if self._flight.airborne and not detail:
             detail = self._link.trouble or self._unordered or self._two_publishers(now_ns)
         rate_hz = 0.0 if silent else self._rate_hz

@@ -16,7 +16,11 @@ Hear = Callable[[str, bytes, bytes], None]
 
 
 class Ros2Link:
-    """Publishers, services and subscriptions of one vehicle; `node`: its own name in ROS 2, "" for none."""
+    """Publishers, services and subscriptions of one vehicle; `node`: its own name in ROS 2, "" for none.
+
+    refused: why the node refused the last of each order, "" if it did not; accepted: orders that it has answered since
+    they were last sent.
+    """
 
     def __init__(
         self, address: str, section: Ros2Section, node: str = "", hear: Hear = lambda key, payload, publisher: None
@@ -25,6 +29,7 @@ class Ros2Link:
         self._velocity: Publisher | None = None
         self._orders: dict[Order, Publisher | Caller] = {}
         self.refused: dict[Order, str] = {}
+        self.accepted: set[Order] = set()
         heard = (names.odometry_key(section), names.battery_key(section)) if node else ()
         self._session = RouterSession(f"tcp/{address}:{section.port}", heard, hear, self._joined)
 
@@ -50,6 +55,8 @@ class Ros2Link:
             success, words = vehicle.decode_answer(answer)
         except WireError:
             success, words = False, "its answer cannot be read"
+        if success:
+            self.accepted.add(order)
         self.refused[order] = "" if success else words or "it gives no reason"
 
     @property
@@ -84,8 +91,13 @@ class Ros2Link:
         """Send an order; returns the bytes sent, empty while the router is away."""
         if order not in self._orders or not self._session.reaches_router:
             return b""
+        self.accepted.discard(order)
         self._orders[order].put(vehicle.NOTHING)
         return vehicle.NOTHING
+
+    def is_taken(self, order: Order) -> bool:
+        """Return whether anybody receives an order."""
+        return order in self._orders and self._orders[order].is_heard
 
     def close(self) -> None:
         """Leave the router; idempotent."""

@@ -221,6 +221,7 @@ KIND = VehicleKind(
     required=frozenset({"mavlink"}),
     has_serial_number=True,
     has_interface=True,
+    take_off=("mavlink", "take_off_m"),
     blink="drivers.mavlink.blink:blink",
     check=_check,
     cautions=_cautions,

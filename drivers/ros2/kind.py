@@ -44,6 +44,7 @@ KIND = VehicleKind(
     sections={"ros2": Ros2Section},
     check=_check,
     shares_address=True,
+    take_off=("ros2", "take_off_m"),
     emulator="sim_bridge.devices.ros2:EMULATION",
     example={"ros2": {"namespace": "drone"}},
     offers={

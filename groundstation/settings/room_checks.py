@@ -4,15 +4,17 @@ import math
 from collections.abc import Iterator
 from itertools import combinations
 
+from groundstation.settings.drones import Drone
 from groundstation.settings.level_heights import FENCE_MARGIN_M, OVER_TARGET_M
 from groundstation.settings.parts import Finding, Parts
+from groundstation.vehicles import kind_named
 
 _ROBOT_HEIGHT_M = 0.3
 
 
 def findings_in_room(parts: Parts) -> Iterator[Finding]:
     """Return places and heights outside of their permitted ranges."""
-    for check in (_fence_in_room, _obstacles, _cameras_above_fence, _pads, _heights):
+    for check in (_fence_in_room, _obstacles, _cameras_above_fence, _pads, _take_offs, _heights):
         yield from check(parts)
 
 
@@ -72,6 +74,25 @@ def _pads(parts: Parts) -> Iterator[Finding]:
                 ("drones", second, "pad_m"),
                 f"is {distance:.2f} m from the pad of {first}: must be >= {least:g} (safety.min_separation_m)",
             )
+
+
+def _take_offs(parts: Parts) -> Iterator[Finding]:
+    """Yield take-offs that lead out of the fence: a vehicle climbs by itself, and the output limiter is not asked."""
+    top_m = math.inf if parts.room is None else parts.room.fence.z_m[1]
+    for name, drone in parts.flying.items():
+        take_off = kind_named(drone.kind).take_off
+        if isinstance(take_off, float) and take_off > top_m:
+            words = f"must be >= {take_off:g}, the height to which {name} ({drone.kind}) takes off by itself"
+            yield ("room", "fence", "z_m", 1), f"{words} (got {top_m:g})"
+        elif isinstance(take_off, tuple) and (height_m := _height_of(drone, *take_off)) > top_m:
+            words = f"must be <= {top_m:g} (room.fence.z_m): lower it, or raise the fence"
+            yield ("drones", name, *take_off), f"{words} (got {height_m:g})"
+
+
+def _height_of(drone: Drone, section: str, key: str) -> float:
+    """Return a height of a drone's own section [m], its default where the file has none."""
+    own, model = drone.sections.get(section), kind_named(drone.kind).sections[section]
+    return float(getattr(own, key) if own is not None else model.model_fields[key].default)
 
 
 def _heights(parts: Parts) -> Iterator[Finding]:

@@ -160,8 +160,9 @@ class VehicleKind:
     sim_bridge.section.Section. true_pose: "module:function" of a receiver of true poses from the simulator behind a
     real firmware (a sim_bridge.real.followers.PoseFeed), "" if there is none. blink: "module:function" that
     makes a standing vehicle visible or audible, called with its driver's section and its name, returns a text on it and
-    raises DriverError; "" if it cannot. flight_time_s: longest flight time with a new battery of the usual size, None
-    where vehicles of one kind differ or it is unknown.
+    raises DriverError; "" if it cannot. take_off: height of its take-off [m]: (section, key) where the field file says
+    it, a number where its firmware does, None if nobody knows. flight_time_s: longest flight time with a new battery of
+    the usual size, None where vehicles of one kind differ or it is unknown.
     """
 
     name: str
@@ -191,4 +192,5 @@ class VehicleKind:
     scenario: Mapping[str, str] = field(default_factory=dict)
     true_pose: str = ""
     blink: str = ""
+    take_off: tuple[str, str] | float | None = None
     flight_time_s: float | None = None

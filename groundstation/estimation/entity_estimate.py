@@ -4,6 +4,7 @@ from groundstation.bus.messages import NEVER_S, EntityEstimate
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.layout import EntityKind
+from groundstation.estimation.velocity_spread import robot_velocity_covariance
 
 
 def entity_estimate(
@@ -15,9 +16,11 @@ def entity_estimate(
     if block.kind is EntityKind.ROBOT:
         size = 4
         velocity: tuple[float, ...] = joint.velocity_of(name)
+        spread = robot_velocity_covariance(joint, name, covariance)
     else:
         size = 2
         velocity = (float(mean[2]), float(mean[3]))
+        spread = covariance[2:4, 2:4]
     return EntityEstimate(
         name=name,
         kind=str(block.kind),
@@ -29,4 +32,5 @@ def entity_estimate(
         unlocalised_s=min(unlocalised_s, NEVER_S),
         contradicted=joint.contradicted(name),
         sighting=joint.sighting(name),
+        velocity_covariance=None if spread is None else tuple(spread.ravel().tolist()),
     )

@@ -22,7 +22,7 @@ from groundstation.estimation.models.protocol import DrivenModel
 from groundstation.estimation.modes import moments_of
 from groundstation.estimation.odometry_ring import OdometryRing
 from groundstation.estimation.parameters import EstimatorParameters
-from groundstation.estimation.records import ADMITTED, COMPARED, DISMISSED, OBSERVATION, PLACED, REPORTED
+from groundstation.estimation.records import ADMITTED, COMPARED, DISMISSED, OBSERVATION, PLACED, REPORTED, EntityMemory
 from groundstation.estimation.replay import replay
 from groundstation.estimation.tables import checkpoints_of, empty_state, tables_from_parameters
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -201,11 +201,8 @@ class FixedLagFilter:
         return (self.age_s(name), math.sqrt(float(memory["seen_variance"]))) if seen else None
 
     def contradicted(self, name: str) -> bool:
-        """Return whether sightings far from an entity's place are being weighed against it.
-
-        True for at most twice the time that the weighing takes; later sightings beyond the gate are ignored. One within
-        the gate ends it.
-        """
+        """Return whether sightings far from an entity's place are being weighed against it."""
+        # At most for twice the time that it takes: later ones beyond the gate are ignored; one within the gate ends it.
         memory, within_s = self._state.memory[self._index[name]], self.parameters.divergence_s
         now, wild = self._seconds(self._now_ns), memory["wild"]
         if memory["corrected_at"] > wild["last"]:
@@ -220,10 +217,13 @@ class FixedLagFilter:
     def velocity_of(self, robot: str) -> tuple[float, float, float]:
         """Return a joined robot's velocity [m/s; world] from its last odometry, corrected by its estimated errors."""
         if robot not in self._velocities:
-            index = self._index[robot]
-            own = self._moments.mean[self._tables.part(index)]
-            self._velocities[robot] = self._driven[index].velocity_m_s(own, self._state.memory[index])
+            (model, memory), own = self.driven(robot), self._moments.mean[self._tables.part(self._index[robot])]
+            self._velocities[robot] = model.velocity_m_s(own, memory)
         return self._velocities[robot]
+
+    def driven(self, robot: str) -> tuple[DrivenModel, EntityMemory]:
+        """Return a joined robot's model, and what it holds of its inputs."""
+        return self._driven[self._index[robot]], self._state.memory[self._index[robot]]
 
     def mode_probabilities(self) -> tuple[float, ...]:
         """Return how likely each combination of modes is; one number where no target switches."""

@@ -34,6 +34,9 @@ class EntityEstimate(msgspec.Struct, frozen=True):
     sighting: tuple[float, float] | None = None
     """Time since the entity itself was last seen [s], and the standard deviation of its position right after that, the
     larger one of x and y [m]."""
+    velocity_covariance: tuple[float, ...] | None = None
+    """Covariance of the velocity, row-major [m^2/s^2]: of a robot's ahead along its heading, to the left and up; of a
+    target's (vx, vy); none: not told."""
 
 
 class TargetSearch(msgspec.Struct, frozen=True):

@@ -5,10 +5,12 @@ from typing import Any
 
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.engineering_views.ros2.codec import Ros2Codec
+from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.time_units import NS_PER_S
 
 # Variance of axes without an estimate: so large that it carries no information.
 _UNKNOWN = 1e6
+_LEAST = 1e-6
 _ALL_UNKNOWN = [_UNKNOWN if index % 7 == 0 else 0.0 for index in range(36)]
 _POSE = (0, 1, 2, 5)
 # By the size of a mean: indices of its covariance, row by row, in that of six axes.
@@ -23,9 +25,26 @@ def covariance_36(entity: EntityEstimate) -> list[float]:
     return full
 
 
+def velocity_covariance_36(entity: EntityEstimate) -> list[float]:
+    """Return the 6 x 6 covariance of a twist in the entity's own frame, row by row; what is not known is so large."""
+    full, told = _ALL_UNKNOWN.copy(), entity.velocity_covariance or ()
+    size = math.isqrt(len(told))
+    for place, value in enumerate(told):
+        row, column = divmod(place, size)
+        # Zero means unknown to many readers.
+        full[6 * row + column] = max(value, _LEAST) if row == column else value
+    return full
+
+
 def heading_xyzw(yaw_rad: float) -> tuple[float, float, float, float]:
     """Return the quaternion (x, y, z, w) of a heading."""
     return 0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)
+
+
+def attitude_xyzw(attitude_rad: Vector3) -> tuple[float, float, float, float]:
+    """Return the quaternion (x, y, z, w) of roll, pitch and yaw [rad; FLU]."""
+    w, x, y, z = quaternion_from_euler(*attitude_rad)
+    return x, y, z, w
 
 
 def velocity_ahead(entity: EntityEstimate) -> Vector3:

@@ -4,7 +4,14 @@ from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.topics import Topic
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
-from groundstation.engineering_views.ros2.geometry import Builder, covariance_36, heading_xyzw, velocity_ahead
+from groundstation.engineering_views.ros2.geometry import (
+    Builder,
+    attitude_xyzw,
+    covariance_36,
+    heading_xyzw,
+    velocity_ahead,
+    velocity_covariance_36,
+)
 from groundstation.engineering_views.ros2.health import HealthMaker
 from groundstation.engineering_views.ros2.markers import MarkerScene
 from groundstation.engineering_views.ros2.names import own
@@ -18,7 +25,7 @@ STATES: tuple[Topic, ...] = (
     t.ESTIMATE, t.PLAN, t.SETPOINT, t.TRUTH, t.VEHICLE_STATUS, t.CAMERA_STATUS, t.PROCESS_STATUS
 )  # fmt: skip
 SHOWN = frozenset((*STATES, t.EVENT, t.IMAGE))
-_NO_TURN, _UNSAID = (0.0,) * 3, (0.0,) * 36
+_NO_TURN = (0.0,) * 3
 
 
 class Ros2Scene:
@@ -80,7 +87,7 @@ class Ros2Scene:
     def _entity(self, stamp_ns: int, entity: m.EntityEstimate, place: tuple[float, ...]) -> list[RosMessage]:
         name, filled = entity.name, self._stencils.filled
         sure = (*place, *covariance_36(entity))
-        moving = (*velocity_ahead(entity), *_NO_TURN, *_UNSAID)
+        moving = (*velocity_ahead(entity), *_NO_TURN, *velocity_covariance_36(entity))
         return [
             filled(own(f"{name}/pose"), SURE_POSE, stamp_ns, {name: sure}),
             filled(own(f"{name}/odom"), ODOMETRY, stamp_ns, {name: sure + moving}),
@@ -94,5 +101,5 @@ class Ros2Scene:
 
     def _truth(self, stamp_ns: int, truth: m.TruthState) -> RosMessage:
         name = truth.header.entity
-        place = (*truth.position_m, *heading_xyzw(truth.attitude_rad[2]))
+        place = (*truth.position_m, *attitude_xyzw(truth.attitude_rad))
         return self._stencils.filled(own(f"{name}/truth"), POSE, stamp_ns, {name: place})

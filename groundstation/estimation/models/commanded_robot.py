@@ -235,3 +235,7 @@ class CommandedRobot:
     def velocity_m_s(self, block: Array, memory: EntityMemory) -> Vector3:
         """Return the velocity [world] from the block's mean and the held command."""
         return world_velocity(block[YAW], (1.0 + block[FORWARD_SCALE]) * memory["held_vx"], 0.0, 0.0)
+
+    def velocity_errors(self, memory: EntityMemory) -> dict[str, Vector3]:
+        """Return by label the change of the velocity [ahead, left, up; along its own axes] per unit of its errors."""
+        return {"forward_scale": (float(memory["held_vx"]), 0.0, 0.0)}

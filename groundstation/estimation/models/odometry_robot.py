@@ -216,3 +216,14 @@ class OdometryRobot:
         forward, left = self.velocity_scale * vx, self.velocity_scale * vy
         climb = state.get("climb", 0.0) + float(self.reports_climb) * memory["held_vz"]
         return world_velocity(state["yaw"], forward, left, climb)
+
+    def velocity_errors(self, memory: EntityMemory) -> dict[str, Vector3]:
+        """Return by label the change of the velocity [ahead, left, up; along its own axes] per unit of its errors."""
+        scale = self.velocity_scale
+        changes: dict[str, Vector3] = {
+            "climb": (0.0, 0.0, 1.0),
+            "velocity_scale": (scale * float(memory["slow_vx"]), scale * float(memory["slow_vy"]), 0.0),
+            "velocity_bias_x": (-scale, 0.0, 0.0),
+            "velocity_bias_y": (0.0, -scale, 0.0),
+        }
+        return {label: change for label, change in changes.items() if label in self.labels}

@@ -5,6 +5,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -24,6 +25,7 @@ from groundstation.engineering_views.ros2.advertised import advertised
 from groundstation.engineering_views.ros2.bag import write_bag
 from groundstation.engineering_views.ros2.codec import DISTRIBUTIONS, Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.scene import SHOWN, Ros2Scene
+from groundstation.geometry.angles import euler_from_quaternion
 from groundstation.recording.run import open_run
 from groundstation.recording.synthetic import SyntheticRun, write_run
 from groundstation.settings.files import find_field
@@ -70,6 +72,37 @@ def test_an_estimate_is_a_frame_a_pose_and_odometry() -> None:
     assert found["/skein/drone_1/odom"].twist.twist.linear.x == pytest.approx(0.3)
     assert found["/skein/drone_1/odom"].twist.twist.linear.y == pytest.approx(0.0)
     assert len(found["/skein/markers"].markers) == 2
+
+
+def test_the_covariance_of_a_twist_is_that_of_the_velocity_in_its_own_frame() -> None:
+    spread = (0.04, 0.01, 0.0, 0.01, 0.09, 0.002, 0.0, 0.002, 0.0)
+    robot = msgspec.structs.replace(robot_heading_along_y(), velocity_covariance=spread)
+    target = m.EntityEstimate("bot", "target", (1.0, 2.0), (0.01, 0.0, 0.0, 0.02), (0.1, 0.0), True, 0.0)
+    target = msgspec.structs.replace(target, velocity_covariance=(0.5, 0.1, 0.1, 0.7))
+    found = taken(m.Estimate(header=header("team"), entities=(robot, target), epoch=1))
+    told = found["/skein/drone_1/odom"].twist.covariance.reshape(6, 6)
+    assert told[:3, :3].tolist() == [[0.04, 0.01, 0.0], [0.01, 0.09, 0.002], [0.0, 0.002, 1e-6]], "0 means unknown"
+    assert np.diag(told)[3:].tolist() == [1e6] * 3
+    planar = found["/skein/bot/odom"].twist.covariance.reshape(6, 6)
+    assert planar[:2, :2].tolist() == [[0.5, 0.1], [0.1, 0.7]] and np.diag(planar)[2:].tolist() == [1e6] * 4
+
+
+def test_a_velocity_without_covariance_is_said_to_be_unknown() -> None:
+    found = taken(m.Estimate(header=header("team"), entities=(robot_heading_along_y(),), epoch=1))
+    told = found["/skein/drone_1/odom"].twist.covariance.reshape(6, 6)
+    assert (told == np.diag([1e6] * 6)).all()
+
+
+def test_a_true_pose_has_its_tilt() -> None:
+    true = m.TruthState(
+        header=header(),
+        position_m=(1.0, 2.0, 3.0),
+        velocity_m_s=(0.0,) * 3,
+        attitude_rad=(0.1, -0.2, 0.3),
+        on_ground=False,
+    )
+    turn = taken(true)["/skein/drone_1/truth"].pose.orientation
+    assert euler_from_quaternion((turn.w, turn.x, turn.y, turn.z)) == pytest.approx((0.1, -0.2, 0.3))
 
 
 def test_a_planar_target_says_nothing_of_height_and_heading() -> None:

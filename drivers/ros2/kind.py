@@ -7,6 +7,9 @@ from drivers.ros2.settings import FASTEST_M_S, Ros2DriverSettings, Ros2Section
 from drivers.vehicle_settings import a_process_each, values_of
 from groundstation.vehicles import ErrorHabits, Finding, Offer, StopDatagrams, VehicleKind, VehicleOrder
 
+# Under it `view --ros2` publishes, estimates as odometry among others: they would be taken for measurements.
+_OURS = "skein/"
+
 
 def _own(order: VehicleOrder) -> Ros2Section:
     return order.section("ros2", Ros2Section())
@@ -28,6 +31,11 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
         own, address = _own(order), order.drone.address
         for key in ("odometry", "battery", "velocity", "take_off", "land", "cut"):
             topic = own.topic(getattr(own, key))
+            if topic.startswith(_OURS):
+                yield (
+                    order.name,
+                    (("ros2", key), f"/{topic} is of Skein's own view: give the topic of the vehicle's node"),
+                )
             other = taken.setdefault((address, own.port, own.domain, topic), f"{order.name}.{key}")
             if other != f"{order.name}.{key}":
                 yield order.name, (("ros2", key), f"/{topic} is already that of {other}: give each its namespace")

@@ -14,6 +14,7 @@ from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
 from groundstation.errors import SettingsError
 from groundstation.geometry.rotations import rotation_x, rotation_y, rotation_z
+from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 from groundstation.settings.new_field import NewDrone, NewRoom, NewTarget, field_text
 from groundstation.vehicles import kind_named
@@ -99,6 +100,16 @@ def test_vehicles_of_one_router_need_names_of_their_own() -> None:
     found = [(name, path) for name, (path, _) in kind.check([subject.order("one"), subject.order("two", 1)])]
     assert found == [("two", ("ros2", key)) for key in ("odometry", "battery", "velocity", "take_off", "land", "cut")]
     assert not list(kind.check([subject.order("one")]))
+
+
+@pytest.mark.parametrize(
+    "section", [{"odometry": "/skein/drone_1/odom"}, {"namespace": "skein", "odometry": "drone_1/odom"}]
+)
+def test_topics_of_our_own_view_are_none_of_a_vehicle(section: dict[str, str]) -> None:
+    options = [f"drones.drone_1.{key}" for key in ("kind=ros2", "camera.source=http://127.0.0.1:8080/video.mjpg")]
+    options += [f"drones.drone_1.ros2.{key}={value}" for key, value in section.items()]
+    with pytest.raises(SettingsError, match=r"ros2.odometry: /skein/drone_1/odom is of Skein's own view"):
+        load_field(find_field("lab"), options)
 
 
 def test_a_new_field_gives_each_node_a_namespace_and_may_have_one_router(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ Columns are named as the fields, vectors by axis, the unit last (`velocity_x_m_s
 stay lists.
 """
 
+import math
 import types
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ Getter = Callable[[Any], Any]
 _UNITS = {
     "_rad_s": "rad/s",
     "_deg_s": "deg/s",
+    "_m2_s2": "m^2/s^2",
     "_m_s2": "m/s^2",
     "_m_s": "m/s",
     "_m2": "m^2",
@@ -194,6 +196,7 @@ def _covariance_name(row: int, col: int) -> str:
 
 
 _UPPER = tuple((row, col) for row in range(4) for col in range(row, 4))
+_UPPER_OF_VELOCITY = tuple((row, col) for row in range(3) for col in range(row, 3))
 _ESTIMATE_COLUMNS = (
     column("name", Cell.TEXT),
     column("kind", Cell.TEXT),
@@ -207,6 +210,7 @@ _ESTIMATE_COLUMNS = (
     column("contradicted", Cell.FLAG),
     column("sighting_age_s", Cell.REAL),
     column("sighting_std_m", Cell.REAL),
+    *(column(f"velocity_covariance_{_XYZ[row]}_{_XYZ[col]}_m2_s2", Cell.REAL) for row, col in _UPPER_OF_VELOCITY),
 )
 
 
@@ -220,5 +224,12 @@ def _estimate_rows(message: m.Estimate) -> list[Row]:
         upper = [entity.covariance[row * size + col] if row < size and col < size else None for row, col in _UPPER]
         trust = [entity.unlocalised_s, entity.contradicted, *(entity.sighting or (None, None))]
         facts = [entity.converged, entity.age_s, message.epoch, *trust]
-        rows.append([entity.name, entity.kind, *mean, *velocity, *upper, *facts])
+        rows.append([entity.name, entity.kind, *mean, *velocity, *upper, *facts, *_velocity_cells(entity)])
     return rows
+
+
+def _velocity_cells(entity: m.EntityEstimate) -> Row:
+    """Return the upper triangle of the covariance of its velocity, of a robot along its own axes."""
+    told = entity.velocity_covariance or ()
+    size = math.isqrt(len(told))
+    return [told[row * size + col] if col < size else None for row, col in _UPPER_OF_VELOCITY]

@@ -65,6 +65,21 @@ def test_a_table_of_estimates_tells_how_far_they_can_be_trusted() -> None:
         assert (row["sighting_age_s"], row["sighting_std_m"]) == cells
 
 
+def test_a_table_of_estimates_has_the_covariance_of_velocities() -> None:
+    estimates, _ = tables_of(t.ESTIMATE)
+    place = ("one", "target", (1.0, 2.0), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, 0.1)
+    names = [f"velocity_covariance_{axes}_m2_s2" for axes in ("x_x", "x_y", "x_z", "y_y", "y_z", "z_z")]
+    for told, cells in (
+        (tuple(map(float, (1, 2, 3, 2, 5, 6, 3, 6, 9))), [1.0, 2.0, 3.0, 5.0, 6.0, 9.0]),
+        ((1.0, 2.0, 2.0, 4.0), [1.0, 2.0, None, 4.0, None, None]),
+        (None, [None] * 6),
+    ):
+        entity = m.EntityEstimate(*place, velocity_covariance=told)
+        row = _row(estimates, m.Estimate(header=HEADER, entities=(entity,), epoch=1))
+        assert [row[name] for name in names] == cells
+    assert {one.unit for one in estimates.columns if one.name in names} == {"m^2/s^2"}
+
+
 def test_each_field_of_an_estimate_is_in_its_table() -> None:
     columns = [one.name for one in tables_of(t.ESTIMATE)[0].columns]
     beginnings = {"mean": "x_m", "velocity_m_s": "velocity"}

@@ -49,8 +49,8 @@ class Truth(threading.Thread):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self._socket.settimeout(0.2)
-        self._mav = dialect.MAVLink(None, 254, 190)
-        self._mav.robust_parsing = True
+        self.mav = dialect.MAVLink(None, 254, 190)
+        self.mav.robust_parsing = True
         self.closing = threading.Event()
         self.start()
 
@@ -62,15 +62,18 @@ class Truth(threading.Thread):
                 if self._ask and time.monotonic() > due:
                     due = time.monotonic() + 1.0
                     self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_SIM_STATE, 20_000)
-                for message in self._mav.parse_buffer(data) or []:
+                for message in self.mav.parse_buffer(data) or []:
                     self._note(message)
         self._socket.close()
 
     def command(self, number: int, *parameters: float) -> None:
         """Send a command as another station would."""
         filled = (*parameters, *[0] * (7 - len(parameters)))
-        message = dialect.MAVLink_command_long_message(SYSTEM, 1, number, 0, *filled)
-        self._socket.sendto(message.pack(self._mav), self._source)
+        self.send(dialect.MAVLink_command_long_message(SYSTEM, 1, number, 0, *filled))
+
+    def send(self, message) -> None:
+        """Send a message as another station would."""
+        self._socket.sendto(message.pack(self.mav), self._source)
 
     def _note(self, message):
         match message.get_type():

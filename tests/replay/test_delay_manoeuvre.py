@@ -63,7 +63,10 @@ def told_in_flight(field: ResolvedField, ticks: Ticks, error_ms: float) -> tuple
     return age, warnings
 
 
-@pytest.mark.parametrize(("error_ms", "than", "proposed"), [(40.0, "older", 160.0), (-40.0, "newer", 80.0)])
+@pytest.mark.parametrize(
+    ("error_ms", "than", "proposed"),
+    [pytest.param(40.0, "older", 160.0, marks=pytest.mark.slow), (-40.0, "newer", 80.0)],
+)
 def test_a_wrong_delay_is_told_in_flight_with_the_setting_that_mends_it(
     lab_field: ResolvedField, manoeuvre: Manoeuvre, error_ms: float, than: str, proposed: float
 ) -> None:

@@ -155,6 +155,8 @@ def test_stamps_that_jump_by_an_hour_are_refused_by_name(lab_field: ResolvedFiel
     assert flight.joined_again() == set()
 
 
+@pytest.mark.slow
+@pytest.mark.study
 def test_messages_that_come_again_at_once_and_much_later_change_nothing(lab_field: ResolvedField) -> None:
     def corrupt(now_s: float, message: Message) -> list[tuple[float, Message]]:
         return [(delay, message) for delay in (0.0, 0.001, 0.3, 11.0)]
@@ -256,7 +258,9 @@ def test_outliers_among_first_sightings_bend_no_height(lab_field: ResolvedField,
     assert "turtlebot" in {name for _, name in flight.joined}  # driving off it leaves all pictures, and is searched for
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=(pytest.mark.slow, pytest.mark.study)) for seed in (2, 3))]
+)
 def test_displaced_entities_are_relocated_among_outliers(lab_field: ResolvedField, seed: int) -> None:
     flight = Abused(lab_field, as_it_is, seed, outliers=0.1).fly(BEGIN_S)
     target = flight.world.targets["turtlebot"]

@@ -95,6 +95,8 @@ def test_vehicles_of_all_kinds_are_flown_by_their_drivers() -> None:
     assert flown["modes"]["drone_2"] != "TRACK"
 
 
+@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["uwb-lab", "mocap-lab"])
 def test_a_team_without_a_ceiling_camera_is_placed_by_what_its_field_has(name: str) -> None:
     field = load_field(find_field(name), ("recording.raw_datagrams=false",))

@@ -257,6 +257,8 @@ def flight(seed: int, duration_s: float = 70.0, start: str = "flat") -> Trace:
     return fly(world, make(world.names))
 
 
+@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize(("seed", "start"), [(1, "flat"), (1, "string")])
 def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -> None:
     trace = flight(seed, start=start)

@@ -45,12 +45,16 @@ def test_the_same_seed_gives_the_same_flight(lab_field: ResolvedField) -> None:
     assert reports[0] == reports[1]
 
 
+@pytest.mark.slow
+@pytest.mark.study
 def test_grossly_wrong_sightings_do_no_harm(lab_field: ResolvedField) -> None:
     report = Study(lab_field, Scenario(), StudyOptions(seed=3, duration_s=15.0, outliers=0.02)).run()
     assert report["verdicts"]["IMPLAUSIBLE"] > 0
     assert max(report["robot_rmse_m"][name] for name in ("drone_1", "drone_2")) <= 0.12
 
 
+@pytest.mark.slow
+@pytest.mark.study
 def test_two_targets_are_found_and_held() -> None:
     scenario = parse_scenario(json.dumps(load_scenario(ROOT / "config/scenarios/two-targets.yaml")))
     field = resolved_field(load_field(ROOT / "config/two-targets.yaml"))

@@ -85,6 +85,7 @@ def judge(reports: Reports, field: ResolvedField, names: tuple[str, ...]) -> Non
         assert LOW - slack <= found[name].mean <= HIGH + slack and found[name].half <= widest, stated
 
 
+@pytest.mark.slow
 def test_a_few_short_flights_are_near_consistent(lab_field: ResolvedField) -> None:
     """4 flights of 12 s: a coarse alarm, wide enough for so few."""
     found = summary(fly(lab_field, range(1, 5), 12.0, 0.0), lab_field)

@@ -40,6 +40,7 @@ def fly(field: ResolvedField, seeds: range, duration_s: float) -> list[dict[str,
     return [Study(field, Scenario(), StudyOptions(seed, duration_s)).run() for seed in seeds]
 
 
+@pytest.mark.slow
 def test_short_flights_are_near_consistent(field: ResolvedField) -> None:
     """A coarse alarm: double counting would show as an error many times its standard deviation.
 

@@ -278,6 +278,8 @@ def test_a_lie_that_ends_in_time_leaves_a_hover_that_waits_for_resume(rig):
     rig.until(lambda: rig.mode == "TRACK", 1.0)
 
 
+@pytest.mark.slow
+@pytest.mark.study
 def test_healthy_flights_and_rest_on_the_floor_give_no_alarm(rig_of, flavour):
     doubts = []
     for seed in range(2):

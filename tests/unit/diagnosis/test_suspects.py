@@ -39,10 +39,10 @@ SLOW = (pytest.mark.slow, pytest.mark.study)
     [
         ({}, None, 0.0),
         pytest.param({("ceiling", "delay"): 50.0}, ("ceiling", "delay"), 0.05, marks=SLOW),
-        ({("drone_1", "delay"): -50.0}, ("drone_1", "delay"), -0.05),
+        pytest.param({("drone_1", "delay"): -50.0}, ("drone_1", "delay"), -0.05, marks=SLOW),
         pytest.param({("drone_1", "own_delay"): 80.0}, ("drone_1", "own_delay"), 0.08, marks=SLOW),
         ({("drone_1", "pan"): 3.0, ("drone_2", "pan"): 3.0}, ("", "pan"), math.radians(3.0)),
-        ({("ceiling", "pitch"): 3.0}, ("ceiling", "tilted"), math.radians(3.0)),
+        pytest.param({("ceiling", "pitch"): 3.0}, ("ceiling", "tilted"), math.radians(3.0), marks=SLOW),
         pytest.param({("turtlebot", "print"): 0.05}, ("turtlebot", "print"), 0.05, marks=SLOW),
         pytest.param({("drone_1", "focal"): 0.04}, ("drone_1", "focal"), 0.04, marks=(*SLOW, pytest.mark.exhaustive)),
     ],

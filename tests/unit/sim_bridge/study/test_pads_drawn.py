@@ -27,6 +27,8 @@ def test_pads_that_leave_no_room_for_another_are_drawn_anew(drones: int, seed: i
     assert len(pads) == drones and min(math.dist(a, b) for a, b in combinations(pads, 2)) >= 1.1
 
 
+@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.timeout(60)
 def test_a_team_that_has_no_room_before_the_camera_is_refused() -> None:
     team = {f"drone_{number}": {"kind": "ardrone"} for number in range(20)}
@@ -49,7 +51,7 @@ def test_pads_and_path_lie_within_the_fence(x_m: tuple[float, float], y_m: tuple
         assert x_m[0] < x - length < x + length < x_m[1] and y_m[0] < y - width < y + width < y_m[1]
 
 
-@pytest.mark.parametrize("half_m", [0.2, 0.6])
+@pytest.mark.parametrize("half_m", [0.2, pytest.param(0.6, marks=(pytest.mark.slow, pytest.mark.study))])
 def test_a_fence_without_room_for_pads_is_refused(half_m: float) -> None:
     with pytest.raises(WrongOrder, match=r"2 drones: pads .* widen room\.fence$"):
         draw(fenced((-half_m, half_m), (-half_m, half_m)), Scenario(), 1, (11.0, 20.0))

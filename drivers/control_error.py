@@ -84,6 +84,11 @@ class Excess:
                 self.excess_m = 0.0  # to stray again it has to go as far again
         return self._obeys_s < tolerance.over_s
 
+    def lose(self) -> None:
+        """Forget a stray: its velocity is not known any more, and may come back as that of one that stands."""
+        if self._obeys_s < self._tolerance.over_s:
+            self.excess_m, self._obeys_s = 0.0, math.inf
+
 
 class ControlErrorMonitor:
     """Judges one vehicle while only its watchdog moves it."""
@@ -122,19 +127,21 @@ class ControlErrorMonitor:
             envelope.step(command, dt_s)
         turning = _TURNING_S * abs(told.yaw_rate_rad_s) * math.hypot(*wanted)
         # All are judged at each turn: while one strays, another may begin to.
-        strays = (
-            self._judge_climb(climb_m_s, _RISES_M_S if view.rises else up, dt_s),
-            self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported"),
-            self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras"),
-        )
-        stray = next(filter(None, strays), "")
+        strays = {
+            "climb": self._judge_climb(climb_m_s, _RISES_M_S if view.rises else up, dt_s),
+            "reported": self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported"),
+            "seen": self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras"),
+        }
+        stray_by, stray = next(((how, why) for how, why in strays.items() if why), ("", ""))
         speeds = [0.0 if reported is None else math.hypot(*reported)]
         speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
+        climbs = 0.0
         if view.foreign:  # others command it, but our limits hold, for a climb too
             self.reset()
-            stray = ""
-            speeds += [view.velocity_m_s[2] if view.fresh else 0.0, climb_m_s or 0.0]
-        return view._replace(speed_m_s=max(speeds), stray=stray)
+            stray = stray_by = ""
+            shown = 0.0 if climb_m_s is None else climb_m_s - CLIMB.deviation_m_s / 2
+            climbs = max(view.velocity_m_s[2] if view.fresh else 0.0, shown)
+        return view._replace(speed_m_s=max(speeds), climb_m_s=climbs, stray=stray, stray_by=stray_by)
 
     def _judge_one(
         self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,
@@ -142,6 +149,7 @@ class ControlErrorMonitor:
     ) -> str:  # fmt: skip
         assert self._envelopes is not None
         if velocity is None:
+            excess.lose()
             return ""
         deviation = math.hypot(*(e.beyond(v) for e, v in zip(self._envelopes, velocity, strict=True)))
         if not excess.step(deviation, turning_m_s, dt_s):
@@ -155,6 +163,7 @@ class ControlErrorMonitor:
         """
         self._climb.step(wanted_m_s, dt_s)
         if climb_m_s is None:
+            self._climbs.lose()
             return ""
         beyond = min(self._climb.beyond(climb_m_s), abs(climb_m_s))
         if not self._climbs.step(beyond, 0.0, dt_s):

@@ -132,6 +132,9 @@ def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[
         allowed = f"{limits.max_speed_m_s:.1f} are allowed"
         condition = Condition.FLOWN_TOO_FAST if vehicle.foreign else Condition.TOO_FAST
         holding[condition] = f"it flies {vehicle.speed_m_s:.1f} m/s, {allowed}"
+    elif vehicle.climb_m_s > limits.tolerated_climb_m_s:
+        allowed = f"{limits.max_climb_m_s:.1f} are allowed"
+        holding[Condition.FLOWN_TOO_FAST] = f"it climbs {vehicle.climb_m_s:.1f} m/s, {allowed}"
 
 
 def timed(at: Situation, limits: WatchdogLimits) -> dict[Condition, float]:
@@ -194,6 +197,7 @@ class Evidence:
         self._waits: dict[Condition, int] = {}
         self._mode: DriverMode | None = None
         self._strayed_ns: int | None = None  # since the last order
+        self._strayed_by = ""  # which velocity
         self._obeyed = False  # since then
 
     def step(self, at: Situation, limits: WatchdogLimits) -> None:
@@ -221,13 +225,13 @@ class Evidence:
         }
 
     def _observe_return(self, at: Situation, limits: WatchdogLimits) -> None:
-        """Note that it strays once more soon after it began to."""
-        stray = self.holding.get(Condition.STRAYS)
+        """Note that it strays once more soon after it began to; one push shows twice: by report, later by cameras."""
+        stray, stray_by = self.holding.get(Condition.STRAYS), at.vehicle.stray_by
         if stray is None:
             self._obeyed = True
         elif self._strayed_ns is None or at.since_s(self._strayed_ns) >= limits.stray_again_s:
-            self._strayed_ns, self._obeyed = at.now_ns, False
-        elif self._obeyed:
+            self._strayed_ns, self._strayed_by, self._obeyed = at.now_ns, stray_by, False
+        elif self._obeyed and stray_by == self._strayed_by:
             self.holding[Condition.STRAYS_AGAIN] = stray
 
     def against_s(self, row: Failsafe) -> float | None:

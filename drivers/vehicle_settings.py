@@ -104,6 +104,7 @@ class SilenceLimits(DriverSection):
             battery_min=limits.battery_min,
             battery_hold_s=limits.battery_hold_s,
             max_speed_m_s=limits.max_speed_m_s,
+            max_climb_m_s=limits.max_climb_m_s,
             pad_m=pad_m,
             min_separation_m=self.min_separation_m,
         )

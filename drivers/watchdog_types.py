@@ -83,6 +83,7 @@ class WatchdogLimits:
     clear_s: float = 2.0
     cut_s: float = 2.0
     max_speed_m_s: float = 0.6
+    max_climb_m_s: float = 0.4
     fast_brake_s: float = 0.1
     fast_resume_s: float = 0.5
     fast_land_s: float = 1.6
@@ -105,18 +106,23 @@ class WatchdogLimits:
         """Return the largest actual speed [m/s]."""
         return 1.3 * self.max_speed_m_s + 0.2
 
+    @property
+    def tolerated_climb_m_s(self) -> float:
+        """Return the largest actual climb [m/s] of a vehicle that others fly."""
+        return 1.3 * self.max_climb_m_s + 0.2
+
 
 class VehicleView(NamedTuple):
     """The vehicle's state by its reports; fresh: telemetry is younger than 0.3 s.
 
     not_ready: why it may not take off, or "". configured: the driver has prepared it for flight; a driver of a standing
     vehicle is not READY before. unsound: why its reported motion cannot be true, or ""; it then counts as silent.
-    velocity_m_s: the reported one, scaled to the true one; None if it reports none. speed_m_s, stray: computed by the
-    host: horizontal speed, of one that others fly also its climb, and how the vehicle strays from its commands, or "";
-    seen: whether cameras show its speed; unseen_s: how long its estimate may have been wrong, by the tracker; near:
-    airborne vehicle too near to its pad, or ""; crowded: why it makes way for another that is too near in flight, or
-    "". lost_s: how long it has lacked a position that it needs; unlocated: whose, and since when, in words. clears:
-    whether a separate order ends its emergency without starting motors.
+    velocity_m_s: the reported one, scaled to the true one; None if it reports none. By the host: speed_m_s,
+    horizontal; climb_m_s, of one that others fly; stray: how the vehicle strays from its commands, or "", and stray_by,
+    which of its velocities says so; seen: whether cameras show its speed. unseen_s: how long its estimate may have been
+    wrong, by the tracker; near: airborne vehicle too near to its pad, or ""; crowded: why it makes way for another that
+    is too near in flight, or "". lost_s: how long it has lacked a position that it needs; unlocated: whose, and since
+    when, in words. clears: whether a separate order ends its emergency without starting motors.
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: the mode in which it flies home by itself, or "".
@@ -134,7 +140,9 @@ class VehicleView(NamedTuple):
     unsound: str = ""
     velocity_m_s: Vector3 | None = None
     speed_m_s: float = 0.0
+    climb_m_s: float = 0.0
     stray: str = ""
+    stray_by: str = ""
     seen: bool = False
     unseen_s: float = 0.0
     near: str = ""

@@ -174,7 +174,7 @@ class Orders:
         self._rises_to_take_off, self._stops_climbing = starts, False
         if action is Action.TAKE_OFF:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
-            self._started = self._mode.taken_over = False
+            self._started = self._mode.taken_over = self.motors.fell = False
             self._requests.accepted -= {"arming", "take-off"}  # once per start: a second request restarts its spool-up
             self._requests.drop("motor cut", "disarming", "landing")
         elif action is not Action.HOVER or self._action is not Action.TAKE_OFF:

@@ -109,6 +109,8 @@ _PX4 = (
     Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32, accepted=(0.1, 4.0)),
 )
 _ARDUPILOT = (
+    # Read first: until then nobody knows whether a pilot counts.
+    Needed(LOSS, 0, f"without a transmitter it would forbid arming; {_NO_RETURN}", others=(3,)),
     Needed("VISO_TYPE", 1, "position from outside, by MAVLink"),
     Needed("VISO_SCALE", 1, "it multiplies our positions", REAL32, optional=True),
     Needed("VISO_DELAY_MS", 0, "poses are sent as predicted to now", accepted=(0, 50), optional=True),
@@ -131,7 +133,6 @@ _ARDUPILOT = (
     Needed(
         "FS_EKF_THRESH", 0.8, "with 0 it does not land then, with more than 1 late", REAL32, (0.6, 1), optional=True
     ),
-    Needed(LOSS, 0, f"without a transmitter it would forbid arming; {_NO_RETURN}", others=(3,)),
     # WIRE (ArduCopter 4.7, RC_Channel.cpp): bit 1 ignores RC_CHANNELS_OVERRIDE and MANUAL_CONTROL; 32 from the factory.
     Needed("RC_OPTIONS", 34, "the sticks of another ground station would fly it, and count as a pilot's", bits=2),
     Needed("BATT_FS_LOW_ACT", 1, _NO_RETURN, others=(0, 7), optional=True),

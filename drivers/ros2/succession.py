@@ -70,7 +70,8 @@ class Succession:
 
     def take(self, now_ns: int, publisher: bytes, message: OdometryMessage) -> None:
         """Keep the publisher and the content of a message that counts."""
-        self._tie.take(publisher, now_ns)
+        if self._tie.take(publisher, now_ns):
+            self._second_ns = 0  # it was the second one: the first is gone
         self._last, self._last_ns = message, now_ns
 
 

@@ -14,7 +14,7 @@ _REMEDIES = (": groundstation ", ": set ")
 _BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
 _TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
 _PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
-# A quartz keeps 100 ppm. Setpoints live for 300 ms, and odometry is dated by its arrival.
+# A quartz keeps 100 ppm. Setpoints live for 300 ms, and most odometry is dated by its arrival.
 _DRIFT_PPM, _LATE_MS = 1000.0, 150.0
 # Mean grey values beyond which detail in black or white is lost. Edges of emulated pictures are 2 to 4 px wide, and 4.5
 # to 7 px after a blur of 2 px (1 sigma), which loses far sightings.

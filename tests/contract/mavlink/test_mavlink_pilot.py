@@ -71,7 +71,7 @@ def test_a_vehicle_whose_lost_transmitter_nothing_tells_has_no_pilot(rig_of):
             rig.copter.fly((0.0, 0.0, min(4.0, 0.02 * turn)), 0.0)
         rig.run(0.01)
     assert rig.mode == "LANDING" and landings(rig) and firmware.mode == firmware.landing
-    assert "m/s, 0.6 are allowed, not by our orders" in rig.host.watchdog.reason
+    assert "it climbs" in rig.host.watchdog.reason and "0.4 are allowed, not by our orders" in rig.host.watchdog.reason
     assert sum("FS_THR_ENABLE is 0, needs 3" in text for text in rig.texts) == 1
 
 
@@ -132,6 +132,12 @@ def test_motors_that_somebody_stops_in_flight_are_told_as_that(rig):
     rig.until(lambda: rig.mode == "LANDED", 8.0)
     rig.run(0.1)
     assert rig.host.watchdog.reason == "its motors were stopped in flight, not by us: it fell"
+    rig.order(Verb.TAKEOFF)
+    rig.run(0.2)
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.mode == "LANDED", 10.0)
+    rig.run(0.2)
+    assert "fell" not in rig.host.watchdog.reason, "of this start nothing fell"
     rig.order(Verb.TAKEOFF)
     rig.until(lambda: rig.mode == "HOVER", 12.0)
     rig.order(Verb.LAND)

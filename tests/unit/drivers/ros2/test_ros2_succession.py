@@ -66,6 +66,14 @@ def test_an_heir_that_continues_the_flight_is_believed(node: Node, height_m: flo
     assert node.rejected == {"second_publisher": 1}
 
 
+def test_of_a_node_that_was_restarted_within_a_second_nobody_is_told_to_end_it(node: Node) -> None:
+    node.say(STANDING)
+    assert "two publishers" in node.say(STANDING, publisher=HEIR).not_ready
+    for _ in range(25):
+        view = node.say(STANDING, publisher=HEIR)
+    assert view.fresh and "two publishers" not in view.not_ready, "the first one has ended"
+
+
 def test_on_the_floor_an_heir_is_taken(node: Node) -> None:
     for _ in range(20):
         node.say(STANDING)

@@ -22,7 +22,7 @@ class Bench:
         self.state = state
         self.fresh = True
         self.battery = 0.9
-        self.not_ready = self.unsound = self.stray = ""
+        self.not_ready = self.unsound = self.stray = self.stray_by = ""
         self.speed = self.unseen_s = self.lost_s = 0.0
         self.unseen = self.lost = self.touches_down = self.on_floor = False
         self.seen = True
@@ -58,11 +58,12 @@ class Bench:
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
         seen = view._replace(unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
         seen = seen._replace(touches_down=self.touches_down, on_floor=self.on_floor, foreign=self.foreign)
-        seen = seen._replace(refuses=self.refuses)
         seen = seen._replace(
             height_m=self.height, away=self.away, homeward=self.homeward, piloted=self.piloted, refuses=self.refuses
         )
-        return seen._replace(speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
+        return seen._replace(
+            speed_m_s=self.speed, seen=self.seen, stray=self.stray, stray_by=self.stray_by, clears=self.clears
+        ).plausible
 
     def see(self):
         """Give the vehicle's state to the watchdog, as its host does before it passes on commands."""

@@ -132,6 +132,16 @@ def test_one_that_swings_to_and_fro_on_hold_lands(new_bench):
         assert bench.run(0.7)[-1] is action
 
 
+def test_one_push_that_cameras_show_later_is_no_second_stray(new_bench):
+    bench = new_bench().fly()
+    bench.stray, bench.stray_by = "1.6 m/s reported, 0.3 m/s asked", "reported"
+    assert set(bench.run(1.0)) == {Action.HOVER}
+    bench.stray = bench.stray_by = ""
+    assert set(bench.run(0.5)) == {Action.HOVER}
+    bench.stray, bench.stray_by = "0.6 m/s seen by cameras, 0.0 m/s asked", "seen"
+    assert set(bench.run(1.0)) == {Action.HOVER}
+
+
 @pytest.mark.parametrize("ended", ["late", "resumed", "held", "stopped for something else"])
 def test_one_that_strays_much_later_or_after_an_order_has_its_time(new_bench, ended):
     bench = new_bench().fly()

@@ -19,7 +19,7 @@ COVERAGE := $(PARTS:%=.pytest_cache/coverage-%.json)
 # Fast tests that wait for sockets, processes or time; all others compute. Each file has loopback addresses of its own.
 WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver tests/contract/mavlink_links \
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
-	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
+	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py tests/unit/drivers/tello/test_tello_video.py
 
 .PHONY: help install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages-1 slow-pages-2 slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
 

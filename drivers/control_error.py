@@ -69,6 +69,11 @@ class Excess:
         self.excess_m = 0.0
         self._obeys_s = math.inf
 
+    @property
+    def strays(self) -> bool:
+        """Whether the vehicle strays."""
+        return self._obeys_s < self._tolerance.over_s
+
     def step(self, deviation_m_s: float, extra_m_s: float, dt_s: float) -> bool:
         """Take a deviation; extra_m_s is tolerated in addition. Return whether the vehicle strays."""
         tolerance = self._tolerance
@@ -78,15 +83,15 @@ class Excess:
             self._obeys_s = 0.0 if self.excess_m >= tolerance.excess_m else self._obeys_s
         else:
             self.excess_m = max(0.0, self.excess_m - tolerance.forgets_m_s * dt_s)
-            strayed = self._obeys_s < tolerance.over_s
+            strayed = self.strays
             self._obeys_s += dt_s
-            if strayed and self._obeys_s >= tolerance.over_s:
+            if strayed and not self.strays:
                 self.excess_m = 0.0  # to stray again it has to go as far again
-        return self._obeys_s < tolerance.over_s
+        return self.strays
 
     def lose(self) -> None:
         """Forget a stray: its velocity is not known any more, and may come back as that of one that stands."""
-        if self._obeys_s < self._tolerance.over_s:
+        if self.strays:
             self.excess_m, self._obeys_s = 0.0, math.inf
 
 
@@ -113,10 +118,10 @@ class ControlErrorMonitor:
         """
         dt_s = 0.0 if self._last_ns is None else min((now_ns - self._last_ns) / NS_PER_S, _LONGEST_STEP_S)
         self._last_ns = now_ns
-        view = view._replace(seen=seen_m_s is not None)  # whoever moves it
+        seen = seen_m_s is not None
         if told is None or told.mode not in FREE or view.flight_state not in UP or view.velocity_m_s is None:
             self.reset()
-            return view
+            return view._replace(seen=seen)
         reported = view.velocity_m_s[:2] if view.fresh else None
         if self._envelopes is None:
             x, y = reported or (0.0, 0.0)
@@ -141,7 +146,7 @@ class ControlErrorMonitor:
             stray = stray_by = ""
             shown = 0.0 if climb_m_s is None else climb_m_s - CLIMB.deviation_m_s / 2
             climbs = max(view.velocity_m_s[2] if view.fresh else 0.0, shown)
-        return view._replace(speed_m_s=max(speeds), climb_m_s=climbs, stray=stray, stray_by=stray_by)
+        return view._replace(seen=seen, speed_m_s=max(speeds), climb_m_s=climbs, stray=stray, stray_by=stray_by)
 
     def _judge_one(
         self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,

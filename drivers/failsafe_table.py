@@ -228,21 +228,16 @@ def _brakes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
 
 
 def _alerts(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
+    aloft = "it does not come down"
     rows = (
-        (Condition.FLIES_AWAY, "{why}", limits.away_told_s, EVENLY),
-        (Condition.LANDING_OVERDUE, "it should have landed by now", limits.landing_s, None),
-    )
-    running = "it stands on the floor with running motors: CUT MOTORS stops them"
-    return (
-        Failsafe(
-            Condition.STANDS_RUNNING, Reaction.TELL, running, limits.stands_told_s, "", EVENLY, Latch.NONE, _LANDS
-        ),
-        *(
-            Failsafe(
-                condition, Reaction.TELL, f"it does not come down: {text}", after_s, "", forgets, Latch.NONE, _LANDS
-            )
-            for condition, text, after_s, forgets in rows
-        ),
+        (Condition.STANDS_RUNNING, "it stands on the floor with running motors: CUT MOTORS stops them",
+         limits.stands_told_s, EVENLY),
+        (Condition.FLIES_AWAY, f"{aloft}: {{why}}", limits.away_told_s, EVENLY),
+        (Condition.LANDING_OVERDUE, f"{aloft}: it should have landed by now", limits.landing_s, None),
+    )  # fmt: skip
+    return tuple(
+        Failsafe(condition, Reaction.TELL, text, after_s, "", forgets, Latch.NONE, _LANDS)
+        for condition, text, after_s, forgets in rows
     )
 
 

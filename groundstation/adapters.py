@@ -32,6 +32,23 @@ def bind_to_adapter(one: socket.socket, interface: str) -> None:
         raise DriverError(f"interface {interface}: {_why(error)}") from error
 
 
+class UdpSender:
+    """Sends datagrams as they are, from a port of its own, through one adapter ("": any); raises DriverError."""
+
+    def __init__(self, interface: str = "") -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        bind_to_adapter(self._socket, interface)
+        self._socket.setblocking(False)
+
+    def send(self, datagram: bytes, addresses: Sequence[Address]) -> None:
+        """Send a datagram to each address; raises the last OSError after all have been tried."""
+        send_to_all(self._socket, (datagram,), addresses)
+
+    def close(self) -> None:
+        """Close the socket; idempotent."""
+        self._socket.close()
+
+
 def send_to_all(udp: socket.socket, datagrams: Sequence[bytes], addresses: Sequence[Address]) -> None:
     """Send datagrams to each address; raises the last OSError after all have been tried."""
     failed: OSError | None = None

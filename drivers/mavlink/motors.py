@@ -10,7 +10,6 @@ _ALOFT_M = 0.5
 # A heartbeat reports it up to a second late; after a landing motors turn for longer before they stop.
 _FELL_NS = 1_300 * NS_PER_MS
 
-
 FELL = "its motors were stopped in flight, not by us: it fell"
 
 

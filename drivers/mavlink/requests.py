@@ -52,7 +52,8 @@ class Requests:
         """Drop requests: a landing must not be followed by a late order to climb."""
         for key in keys:
             self._open.pop(key, None)
-            self._provisional = {c: one for c, one in self._provisional.items() if one[0] != key}
+        for command in [c for c, (key, _) in self._provisional.items() if key in keys]:
+            del self._provisional[command]
 
     def forget(self) -> None:
         """Begin anew, for a restarted vehicle."""

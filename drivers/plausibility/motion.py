@@ -194,26 +194,24 @@ class MotionMonitor:
     def _judge_clock(self, sample: MotionSample) -> list[_Judged]:
         if sample.vehicle_ns is None:
             return []
-        limits = self.limits
         stands_s, late_s = self._clock.update(sample.stamp_ns, sample.vehicle_ns)
-        if stands_s >= limits.clock_stands_s:
+        if stands_s >= self.limits.clock_stands_s:
             return [(Sensor.CLOCK, Health.BAD, _CLOCK_STANDS)]
-        if late_s < limits.clock_suspect_s:
-            return []
-        health = Health.BAD if late_s >= limits.clock_late_s else Health.SUSPECT
-        return [(Sensor.CLOCK, health, f"its telemetry is {late_s:.1f} s late")]
+        return self._judge_lateness(late_s, late_s)
 
     def _judge_ticks(self, sample: MotionSample) -> list[_Judged]:
         if sample.counted_s is None:
             return []
-        limits = self.limits
         newest_s, both_s = self._ticks.update(sample.stamp_ns, sample.counted_s)
         # A verdict lasts until the next step: after a pause of the link a punctual one ends it at once.
         self._held.pop(Sensor.CLOCK, None)
-        if newest_s < limits.clock_suspect_s:
+        return self._judge_lateness(newest_s, both_s)
+
+    def _judge_lateness(self, late_s: float, certain_s: float) -> list[_Judged]:
+        if late_s < self.limits.clock_suspect_s:
             return []
-        health = Health.BAD if both_s >= limits.clock_late_s else Health.SUSPECT
-        return [(Sensor.CLOCK, health, f"its telemetry is {newest_s:.1f} s late")]
+        health = Health.BAD if certain_s >= self.limits.clock_late_s else Health.SUSPECT
+        return [(Sensor.CLOCK, health, f"its telemetry is {late_s:.1f} s late")]
 
     # -- values and steps ---------------------------------------------------------------------------------------------
 

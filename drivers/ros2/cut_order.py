@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # By then a vehicle without motors has fallen from 4 m and says so; the watchdog lands one that flies on 2 s after CUT.
-_ANSWER_NS, _LATEST_NS = 1_200_000_000, NS_PER_S
+_ANSWER_NS, _LATEST_NS = 1_200 * NS_PER_MS, NS_PER_S
 _STANDS_M, _FELL_M = 0.2, 0.3
 
 

@@ -1,11 +1,10 @@
 """Transports of failsafe datagrams: plain UDP, or that of the drone's driver package for its links."""
 
-import socket
 from collections.abc import Callable, Sequence
 from pkgutil import resolve_name
 from typing import Protocol, runtime_checkable
 
-from groundstation.adapters import Address, bind_to_adapter, send_to_all
+from groundstation.adapters import Address, UdpSender
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 
 
@@ -27,27 +26,10 @@ class Successor(FailsafeTransport, Protocol):
         """Take the number that the driver recorded, 0 for none; called each time before it sends for the driver."""
 
 
-class UdpFailsafe:
-    """Datagrams as they are, from a port of its own, through one network adapter ("": any); raises DriverError."""
-
-    def __init__(self, interface: str = "") -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        bind_to_adapter(self._socket, interface)
-        self._socket.setblocking(False)
-
-    def send(self, datagram: bytes, addresses: Sequence[Address]) -> None:
-        """Send a datagram to each address."""
-        send_to_all(self._socket, (datagram,), addresses)
-
-    def close(self) -> None:
-        """Close the socket; idempotent."""
-        self._socket.close()
-
-
 def open_transport(datagrams: FailsafeDatagrams, speaker: int) -> FailsafeTransport:
     """Return the transport of one link; raises the driver package's error for an unusable link."""
     if not datagrams.transport:
-        return UdpFailsafe(datagrams.interface)
+        return UdpSender(datagrams.interface)
     # By name, as drivers are started: the supervisor knows no protocols.
     make: Callable[[str, int], FailsafeTransport] = resolve_name(datagrams.transport)
     return make(datagrams.way, speaker)

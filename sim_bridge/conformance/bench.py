@@ -3,7 +3,6 @@
 import importlib
 import os
 import signal
-import socket
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from groundstation.adapters import UdpSender
 from groundstation.bus.messages import AckStage, Verb
 from groundstation.bus.topics import COMMAND_ACK, EVENT, PROCESS_STATUS, VEHICLE_STATUS
 from groundstation.bus.zenoh_bus import open_bus, open_router
@@ -250,18 +250,6 @@ class Bench:
 
 def _open(stop: StopDatagrams) -> Any:
     if not stop.transport:
-        return _UdpFailsafe()
+        return UdpSender()
     module, _, name = stop.transport.partition(":")
     return getattr(importlib.import_module(module), name)(stop.way, _GUARDIAN)
-
-
-class _UdpFailsafe:
-    def __init__(self) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-
-    def send(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
-        for address in addresses:
-            self._socket.sendto(datagram, address)
-
-    def close(self) -> None:
-        self._socket.close()

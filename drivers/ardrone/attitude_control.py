@@ -108,7 +108,10 @@ class AttitudeControl:
         back = decision.back_m_s if holds else None
         if holds and report.fresh and back is None:
             return self._loop.hold(report.velocity_m_s, dt_s)
-        if not report.fresh or (decision.action is not Action.FLY and back is None):
+        if not report.fresh:
+            self._loop.lose()
+            return HOVER
+        if decision.action is not Action.FLY and back is None:
             self._loop.reset()
             return HOVER
         wanted = decision.velocity_m_s if back is None else back

@@ -17,6 +17,8 @@ from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 _LONGEST_STEP_S = 0.1
 # Time constant for following the speed of a drone that holds its place by itself: it covers noise, and its braking.
 _HELD_S = 0.15
+# Share of a first measured speed that is motion: half of it is noise of a drone that holds its place.
+_OF_HOVER = 0.5
 # A drone that reports to stand and does not lags behind its commands by more than this; integral of the excess at which
 # that counts, and how fast it shrinks.
 _STANDS_OFF_M_S, _STANDS_OFF_M, _FORGETS_M_S = 0.15, 0.05, 0.2
@@ -71,8 +73,14 @@ class VelocityLoop:
         self._flying = False
         self._still_s = self._stands_off_m = 0.0
         self._held_m_s: tuple[float, float] | None = None
+        self._believed = _OF_HOVER
         for drift in self._drifts:
             drift.reset()
+
+    def lose(self) -> None:
+        """Forget the motion of a drone that is not heard: it may fly its last attitude on."""
+        self.reset()
+        self._believed = 1.0
 
     def hold(self, measured_m_s: Vector3, dt_s: float) -> AttitudeRequest:
         """Let the drone hold its place, and note its true (scaled) speed, from which it is braked if it goes blind."""
@@ -175,8 +183,8 @@ class VelocityLoop:
         if not self._flying:
             self._flying = True
             first: tuple[float, ...] = self._held_m_s or (0.0, 0.0)
-            if measured_m_s is not None:  # half of it is noise of a drone that holds its place
-                first = tuple(0.5 * v for v in measured_m_s)
+            if measured_m_s is not None:
+                first = tuple(self._believed * v for v in measured_m_s)
             self._held_m_s = None
             for axis, speed in zip(axes, first, strict=False):
                 axis.start(speed)

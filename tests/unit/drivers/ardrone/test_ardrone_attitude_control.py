@@ -78,6 +78,13 @@ def test_a_velocity_that_contradicts_what_was_asked_for_is_doubted_until_it_land
     assert not turns.control.doubted
 
 
+def test_one_that_flew_its_last_tilt_on_while_its_link_was_silent_contradicts_nothing(turns) -> None:
+    turns(Action.HOVER, SILENT, 0.7)
+    for speed_m_s in (0.6, 0.7, 0.7, 0.65, 0.55, 0.45, 0.35, 0.25, 0.15):
+        turns(Action.FLY, SOUND._replace(velocity_m_s=(speed_m_s, 0.0, 0.0)), velocity_m_s=(-0.3, 0.0, 0.0))
+    assert turns.control.doubted == ""
+
+
 def test_it_is_believed_again_once_cameras_have_seen_the_drone_stand_as_it_reports(turns) -> None:
     turns(Action.FLY, WRONG, 3.0, velocity_m_s=(0.4, 0.0, 0.0))
     turns(Action.HOVER, STILL, 2.0, seen_m_s=(0.02, 0.0))

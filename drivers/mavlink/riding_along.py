@@ -5,6 +5,7 @@ from collections.abc import Collection
 from enum import Enum
 
 from drivers.mavlink.wire import flight, service
+from drivers.mavlink.wire.event_request import REQUEST_EVENT, event_request_of
 from drivers.mavlink.wire.frames import IDS, Message
 from drivers.mavlink.wire.names import (
     CUSTOM_MODE_ENABLED,
@@ -48,6 +49,9 @@ _BY_SETTING = {
     "missions": frozenset(number for name, number in IDS.items() if name.startswith("MISSION_")),
 }
 _JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE", "FILE_TRANSFER_PROTOCOL"))
+_JUDGED |= {REQUEST_EVENT}
+# WIRE (docs/reference/mavlink.md 5.11): QGroundControl asks for one at a time, and PX4 answers for each, known or not.
+_MOST_EVENTS = 8
 
 
 def may_pass(number: int, allowed: Collection[str] = ()) -> bool:
@@ -60,13 +64,16 @@ def _is_allowed(number: int, allowed: Collection[str]) -> bool:
 
 
 def passage_of(
-    number: int, message: Message | None, system: int, flavour: Flavour, allowed: Collection[str] = ()
+    number: int, message: Message | None, system: int, flavour: Flavour, allowed: Collection[str] = (), raw: bytes = b""
 ) -> Passage:
     """Return how to treat a verified frame of a second ground station.
 
     number: of its kind; message: None if its content is unknown; system: the vehicle; allowed: "parameters",
-    "missions".
+    "missions"; raw: the frame itself.
     """
+    if number == REQUEST_EVENT and raw:
+        request = event_request_of(raw)
+        return Passage.PASS if request.system == system and request.events <= _MOST_EVENTS else Passage.DROP
     match message:
         case flight.CommandLong() | flight.CommandInt() if message.target_system in (0, system):
             return _of_command(message, flavour)

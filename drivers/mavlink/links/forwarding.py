@@ -165,7 +165,7 @@ class ForwardedLink(Transport):
 
     def _judge(self, rider: Rider, raw: bytes, frame: ReceivedFrame) -> None:
         message = frame.message
-        match passage_of(number_of(raw), message, rider.system, rider.flavour, rider.allowed):
+        match passage_of(number_of(raw), message, rider.system, rider.flavour, rider.allowed, raw):
             case Passage.STOP if message is not None:
                 if not self._is_signed(rider, raw, words_of(message, rider.flavour)):
                     return

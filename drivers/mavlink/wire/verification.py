@@ -1,7 +1,7 @@
 """Verifies frames before their content is used: signature, checksum, time of signing. No decoding.
 
-A frame of any kind that pymavlink's widest dialect knows can be verified, whether or not this project uses it; a frame
-of another kind cannot, because its checksum needs a seed from its definition.
+A frame of any kind of the standard, or that pymavlink's widest dialect knows, can be verified, whether or not this
+project uses it; a frame of another kind cannot, because its checksum needs a seed from its definition.
 """
 
 import hmac
@@ -24,8 +24,32 @@ from drivers.mavlink.wire.signature import (
 
 # WIRE (pymavlink): a new sender may sign with a time up to a minute old [10 us].
 _NEW_SENDER_LAG = 6_000_000
-# WIRE (docs/reference/mavlink.md 5.10): the seed comes from a message's definition: other dialects fail.
-_CRC_EXTRA = {number: bytes([kind.crc_extra]) for number, kind in widest.mavlink_map.items()}
+# WIRE (docs/reference/mavlink.md 5.10): the seed comes from a message's definition: other dialects fail. pymavlink's
+# definitions are ArduPilot's, which lack these of the standard (common.xml, minimal.xml); a PX4 sends many unrequested.
+_STANDARD_EXTRA = {
+    8: 117,  # LINK_NODE_STATUS
+    80: 14,  # COMMAND_CANCEL
+    290: 251,  # ESC_INFO
+    291: 10,  # ESC_STATUS
+    300: 217,  # PROTOCOL_VERSION
+    334: 72,  # CELLULAR_STATUS
+    336: 245,  # CELLULAR_CONFIG
+    371: 10,  # FUEL_STATUS
+    372: 26,  # BATTERY_INFO
+    380: 232,  # TIME_ESTIMATE_TO_TARGET
+    395: 0,  # COMPONENT_INFORMATION
+    396: 50,  # COMPONENT_INFORMATION_BASIC
+    397: 182,  # COMPONENT_METADATA
+    400: 110,  # PLAY_TUNE_V2
+    401: 183,  # SUPPORTED_TUNES
+    410: 160,  # EVENT
+    411: 106,  # CURRENT_EVENT_SEQUENCE
+    412: 33,  # REQUEST_EVENT
+    413: 77,  # RESPONSE_EVENT_ERROR
+    440: 66,  # ILLUMINATOR_STATUS
+}
+_EXTRA = _STANDARD_EXTRA | {number: kind.crc_extra for number, kind in widest.mavlink_map.items()}
+_CRC_EXTRA = {number: bytes([extra]) for number, extra in _EXTRA.items()}
 
 
 @dataclass(frozen=True, slots=True)

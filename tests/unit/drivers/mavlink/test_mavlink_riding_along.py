@@ -1,11 +1,13 @@
 """A second ground station may query and stop; messages that fly, feed or configure a vehicle are not forwarded."""
 
 import math
+import struct
 
 import pytest
 
 from drivers.mavlink.riding_along import Passage, made_good, may_pass, passage_of, words_of
 from drivers.mavlink.wire import flight, service, telemetry
+from drivers.mavlink.wire.event_request import REQUEST_EVENT
 from drivers.mavlink.wire.frames import CLASSES, IDS, id_of
 from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
 
@@ -127,3 +129,22 @@ def test_a_pause_of_an_ardupilot_ends_in_a_mode_that_is_seen_and_other_stops_nee
 )
 def test_a_stop_is_told_in_words(stop, flavour, words):
     assert words_of(stop, flavour) == words
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "system", "passage"),
+    [
+        (7, 7, SYSTEM, Passage.PASS),
+        (0, 0, SYSTEM, Passage.PASS),
+        (65535, 2, SYSTEM, Passage.PASS),
+        (8, 7, SYSTEM, Passage.DROP),
+        (0, 8, SYSTEM, Passage.DROP),
+        (7, 7, SYSTEM + 1, Passage.DROP),
+    ],
+    ids=["one", "the first", "across the end", "all 65536", "nine", "of another vehicle"],
+)
+def test_it_may_ask_for_a_few_events_that_it_has_missed(first, last, system, passage):
+    payload = struct.pack("<HHBB", first, last, system, 1)
+    raw = bytes((0xFD, len(payload), 0, 0, 0, 255, 190)) + REQUEST_EVENT.to_bytes(3, "little") + payload + b"\0\0"
+    assert may_pass(REQUEST_EVENT)
+    assert passage_of(REQUEST_EVENT, None, SYSTEM, Flavour.PX4, raw=raw) is passage

@@ -1,4 +1,8 @@
-"""The share of a vehicle's frames that arrive, by their sequence numbers."""
+"""The share of an autopilot's frames that arrive, by their sequence numbers.
+
+WIRE (docs/reference/mavlink.md 5.6): another component's numbers show no losses: frames that are not for us stay on
+board.
+"""
 
 import threading
 
@@ -12,19 +16,18 @@ class Traffic:
     """Frames of the last second; counted by the reader, read by the sender loop."""
 
     def __init__(self) -> None:
-        self._newest: dict[int, int] = {}
+        self._newest: int | None = None
         self._arrivals = Arrivals()
         self._lock = threading.Lock()
 
-    def count(self, now_ns: int, component: int, sequence: int) -> None:
-        """Take the number of a frame; each component of a vehicle counts separately, modulo 256."""
-        newest = self._newest.get(component)
-        step = 1 if newest is None else (sequence - newest) % 256
+    def count(self, now_ns: int, sequence: int) -> None:
+        """Take the number of a frame, modulo 256."""
+        step = 1 if self._newest is None else (sequence - self._newest) % 256
         if step >= _HALF_TURN:
             # A reordered frame, counted as missing before, or a restarted sender.
             step = 0 if 256 - step <= _OVERTAKEN else 1
         if step:
-            self._newest[component] = sequence
+            self._newest = sequence
         with self._lock:
             self._arrivals.add(now_ns, step)
 

@@ -83,8 +83,10 @@ class MavlinkVehicle:
 
     def take(self, heard: Heard) -> None:
         """Take a frame of this vehicle; unusable frames are counted."""
-        self._traffic.count(heard.stamp_ns, heard.frame.component, heard.frame.sequence)
-        if heard.frame.component != AUTOPILOT_COMPONENT or heard.frame.message is None:
+        if heard.frame.component != AUTOPILOT_COMPONENT:
+            return
+        self._traffic.count(heard.stamp_ns, heard.frame.sequence)
+        if heard.frame.message is None:
             return
         try:
             self._take(heard.stamp_ns, heard.frame.message)

@@ -12,7 +12,7 @@ MS = 1_000_000
 def quality(sequences):
     traffic = Traffic()
     for rank, sequence in enumerate(sequences):
-        traffic.count(S + rank * MS, 1, int(sequence) % 256)
+        traffic.count(S + rank * MS, int(sequence) % 256)
     return traffic.rates(S + len(sequences) * MS)[1]
 
 

@@ -9,6 +9,8 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _PIECE = 50
 _JUMP_MS = 1000
+# Longer than radios keep frames while they are busy: a queue of 10 kB at 1 kB/s.
+_KEPT_MS = 10_000
 _PIECES = 8
 _NEXT_WITHIN_NS = NS_PER_S // 2
 _RECENT_S = 2
@@ -126,12 +128,19 @@ class BootClock:
     def __init__(self) -> None:
         self.restarted = False
         self._last: tuple[int, int] | None = None
+        self._late_ms = 0
 
     def take(self, now_ns: int, boot_ms: int) -> int:
-        """Take a stamp; return its jump [ms], or 0; a gap in the link is no jump."""
+        """Take a stamp; return its jump [ms], or 0; a gap in the link is no jump.
+
+        Nor are frames that a radio kept for some seconds, and those that come in time again.
+        """
         before, self._last = self._last, (now_ns, boot_ms)
         if before is None:
             return 0
-        self.restarted = self.restarted or boot_ms < before[1] - _JUMP_MS
         jump = boot_ms - before[1] - (now_ns - before[0]) // 1_000_000
-        return jump if abs(jump) > _JUMP_MS else 0
+        if boot_ms < before[1] - _JUMP_MS:
+            self.restarted, self._late_ms = True, 0
+            return jump
+        excused, self._late_ms = self._late_ms, min(max(self._late_ms - jump, 0), _KEPT_MS)
+        return 0 if -_KEPT_MS <= jump <= excused + _JUMP_MS else jump

@@ -72,6 +72,10 @@ class LatestTelemetry:
         """Return whether its velocity is younger than 0.3 s."""
         return now_ns - self.moved_ns < FRESH_NS
 
+    def tells_attitude(self, now_ns: int) -> bool:
+        """Return whether its attitude is younger than 0.3 s."""
+        return now_ns - self.attitude_ns < FRESH_NS
+
     def fell_silent(self, now_ns: int) -> bool:
         """Return whether it was heard, and is not any more."""
         return self.heartbeat_ns > 0 and now_ns - self.heard_ns > FRESH_NS

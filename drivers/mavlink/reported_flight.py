@@ -13,6 +13,8 @@ from groundstation.time_units import NS_PER_S
 _ENDED_NS = NS_PER_S
 # A pilot's sticks stop it within this, and cameras see that late: their speed is a mean over half a second.
 _STOPS_NS = 3 * NS_PER_S // 2
+# WIRE (docs/reference/mavlink.md 1, 2): neither firmware refuses EXTENDED_SYS_STATE.
+_ANSWERS_NOTHING = "it is heard, but sends nothing that it is asked for: it may not hear this computer"
 
 
 class ReportedFlight:
@@ -61,10 +63,23 @@ class ReportedFlight:
             return words
         # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
         heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
-        if not heard or not known.moved_ns:
+        if not heard:
+            return ""
+        if not known.landed_ns:
+            return _ANSWERS_NOTHING
+        if not known.moved_ns:
             return ""
         ended = now_ns - known.moved_ns > _ENDED_NS
         return slow or ("it tells no velocity, as its own estimator knows none" if ended else "its velocity stays away")
+
+    def unsound(self, now_ns: int, known: LatestTelemetry, why: str, slow: str) -> tuple[str, str]:
+        """Return why its motion cannot be true, and which report it lacks, "" each; why: the former by its values.
+
+        An attitude that does not arrive repeats as one that is stuck does, but its sensor is not to blame.
+        """
+        if why and not known.tells_attitude(now_ns) and known.tells_motion(now_ns):
+            return "", slow or "its attitude stays away"
+        return why, self.mute(now_ns, known, slow)
 
     def is_piloted(self, now_ns: int, known: LatestTelemetry) -> bool:
         """Return whether a pilot's sticks may move it; call it once a turn."""

@@ -183,7 +183,8 @@ class MavlinkVehicle:
     def view(self, now_ns: int) -> VehicleView:
         """Return the vehicle's last reported state."""
         known = self.telemetry
-        unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
+        wrong = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
+        unsound, mute = self._flight.unsound(now_ns, known, wrong, self._session.slow)
         heeded = self.orders.are_heeded(now_ns, known.custom_mode)
         piloted = self._flight.is_piloted(now_ns, known)
         limited = heeded or self._flight.must_keep_limits(now_ns)
@@ -191,11 +192,11 @@ class MavlinkVehicle:
         not_ready = doubled or self._readiness.why_not(now_ns, known)
         battery = known.batteries.charge(now_ns)
         velocity = self._true_velocity(now_ns, known) if limited else None
-        lost_s, mute = self.vision.lost_s(now_ns), self._flight.mute(now_ns, known, self._session.slow)
+        fresh = self._flight.is_heard(now_ns, known) and bool(unsound or not wrong)
         return VehicleView(
-            self._flight.told(now_ns, known), self._flight.is_heard(now_ns, known), battery, not_ready,
-            unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, unlocated=self.vision.missed, mute=mute,
-            homeward=self._flight.homeward(now_ns, known), foreign=not heeded,
+            self._flight.told(now_ns, known), fresh, battery, not_ready,
+            unsound=unsound, velocity_m_s=velocity, lost_s=self.vision.lost_s(now_ns),
+            unlocated=self.vision.missed, mute=mute, homeward=self._flight.homeward(now_ns, known), foreign=not heeded,
             piloted=piloted, rises=self.orders.rises(now_ns), fell=FELL if self.orders.motors.fell else "",
             unarmed=self._readiness.refusal(known),
         )  # fmt: skip

@@ -5,7 +5,7 @@ from drivers.mavlink.commands import Orders
 from drivers.mavlink.identity import Misfit
 from drivers.mavlink.latest_telemetry import FRESH_NS, HEARTBEAT_NS, LatestTelemetry
 from drivers.mavlink.lift_off import credible
-from drivers.mavlink.wire.names import ARMED, Flavour, Landed, flies_home, mode_name
+from drivers.mavlink.wire.names import ARMED, Flavour, Landed, MavState, flies_home, mode_name
 from groundstation.bus.messages import FlightState
 from groundstation.time_units import NS_PER_S
 
@@ -23,6 +23,7 @@ class ReportedFlight:
     def __init__(self, flavour: Flavour, orders: Orders, misfit: Misfit) -> None:
         self._flavour, self._orders, self._misfit = flavour, orders, misfit
         self._piloted_ns: int | None = None
+        self._critical = False
 
     def told(self, now_ns: int, known: LatestTelemetry) -> FlightState:
         """Return the state to act upon, by its reports and its orders."""
@@ -80,6 +81,16 @@ class ReportedFlight:
         if why and not known.tells_attitude(now_ns) and known.tells_motion(now_ns):
             return "", slow or "its attitude stays away"
         return why, self.mute(now_ns, known, slow)
+
+    def failsafe(self, known: LatestTelemetry) -> str:
+        """Return that its autopilot is in a failsafe, with its mode, when that begins while its motors turn, or "".
+
+        WIRE (docs/reference/mavlink.md 5.2): its text about it comes once, and radios lose texts.
+        """
+        critical = known.status == MavState.CRITICAL and bool(known.base_mode & ARMED)
+        begins, self._critical = critical and not self._critical, critical
+        mode = mode_name(self._flavour, known.custom_mode)
+        return f"its autopilot reports a failsafe of its own, in {mode}" if begins else ""
 
     def is_piloted(self, now_ns: int, known: LatestTelemetry) -> bool:
         """Return whether a pilot's sticks may move it; call it once a turn."""

@@ -210,6 +210,8 @@ class MavlinkVehicle:
         """Send the vehicle its commands for the decision, poses for its estimator, and pending requests."""
         known = self.telemetry
         self._take_answers(now_ns)
+        if failsafe := self._flight.failsafe(known):
+            self.orders.events.append((MavSeverity.WARNING, failsafe))
         silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else NEVER_NS
         if self._boot_clock.restarted and not known.base_mode & ARMED:
             self._boot_clock.restarted = False

@@ -69,8 +69,9 @@ class MavResult(IntEnum):
 
 
 class MavState(IntEnum):
-    """MAV_STATE: that of an emergency, the ends of a flight, of which the second is also the greatest."""
+    """MAV_STATE: a failsafe, an emergency, and the ends of a flight, of which the second is also the greatest."""
 
+    CRITICAL = 5
     EMERGENCY = 6
     POWEROFF = 7
     FLIGHT_TERMINATION = 8

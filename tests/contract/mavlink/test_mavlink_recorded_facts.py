@@ -2,7 +2,46 @@
 
 from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.wire.frames import ReceivedFrame
+from drivers.mavlink.wire.names import ARMED, CopterMode, Flavour, Px4Main, px4_mode
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, ExtendedSysState, Heartbeat, LocalPositionNed
+
+POSITION = {Flavour.PX4: px4_mode(Px4Main.POSITION), Flavour.ARDUPILOT: CopterMode.LOITER}
+OF_ITS_OWN = "its autopilot reports a failsafe of its own, in "
+
+
+def beat(rig, status, armed=True):
+    message = Heartbeat(2, rig.flavour, 1 | (ARMED if armed else 0), POSITION[rig.flavour], status)
+    rig.vehicle.take(Heard(rig.hand.now, ReceivedFrame(11, 1, 0, message)))
+    rig.emulator.speaker.builders[Heartbeat] = lambda: message
+
+
+def told(rig):
+    return [text for text in rig.texts if text.startswith(OF_ITS_OWN)]
+
+
+def test_a_failsafe_of_the_autopilot_is_told_by_its_heartbeat_alone(rig):
+    """A PX4 that lost OFFBOARD went to POSITION, critical; the radio lost its text."""
+    rig.track_on()
+    beat(rig, 4)
+    rig.run(1.0)
+    assert not told(rig)
+    beat(rig, 5)
+    rig.run(3.0)
+    name = {Flavour.PX4: "POSITION", Flavour.ARDUPILOT: "LOITER"}[rig.flavour]
+    assert told(rig) == [OF_ITS_OWN + name]
+    beat(rig, 4)
+    rig.run(1.1)
+    beat(rig, 5)
+    rig.run(1.1)
+    assert len(told(rig)) == 2
+
+
+def test_a_failsafe_on_the_floor_with_motors_off_is_none(rig):
+    """An ArduCopter without its transmitter says critical all the time it stands."""
+    rig.connect()
+    beat(rig, 5, armed=False)
+    rig.run(3.0)
+    assert not told(rig)
 
 
 def test_an_attitude_that_stays_away_is_missed_by_name_and_its_sensor_is_not_blamed(rig):

@@ -17,7 +17,7 @@ _STILL_RAD_S, _BLOCK_STD = 0.05, 2e-4
 # Deviation of roll and pitch after a while; and at the start, from one sample of a vehicle that may accelerate.
 _SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)
 # Random walk of a magnetic heading, and of an integrated gyro beside its bias [rad per root second].
-_HEADING_WANDER, _GYRO_WANDER = math.radians(1.7), math.radians(0.1)
+_HEADING_WANDER, GYRO_WANDER = math.radians(1.7), math.radians(0.1)
 # The same of a heading that a camera shows: its error changes as the vehicle crosses the view.
 _SIGHT_WANDER = math.radians(0.3)
 _SPAN_NS = 2 * NS_PER_S  # between two uses of the heading
@@ -48,7 +48,7 @@ class GyroBias:
     @property
     def yaw_std_rad(self) -> float:
         """Return the random walk of a heading by these gyroscopes [rad per root second]."""
-        return math.sqrt(_GYRO_WANDER**2 + self._turn.bias_variance * _HORIZON_S)
+        return math.sqrt(GYRO_WANDER**2 + self._turn.bias_variance * _HORIZON_S)
 
     def begin(self) -> None:
         """Begin roll, pitch and heading anew from one sample."""

@@ -89,7 +89,7 @@ def settle(state: State, tables: Tables, event: EventRow, z: Vector) -> bool:
 def note_joining(memory: EntityMemory) -> None:
     """Note that an entity joined: without contradictions so far, and not yet confirmed."""
     memory.active = memory.unconfirmed = 1
-    memory.wild.count = memory.refused.count = 0
+    memory.wild.count = memory.astray.count = memory.refused.count = 0
 
 
 @kernel()

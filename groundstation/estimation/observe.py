@@ -11,6 +11,8 @@ from groundstation.estimation.deferred import make_all, variance_of
 from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.joining import admit
+from groundstation.estimation.linear import copy_matrix
+from groundstation.estimation.lost_observer import answers_for, face, loosen, note_turn
 from groundstation.estimation.motion import clear, enter, join
 from groundstation.estimation.outliers import agree, blame, doubt_velocity, forget_noted_error, note_given_up
 from groundstation.estimation.records import (
@@ -85,6 +87,47 @@ def confront_place(state: State, tables: Tables, event: EventRow, hypothesis: Hy
     return max(excess, 1.0)
 
 
+@kernel()
+def face_subject(
+    state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis, insists: bool
+) -> None:  # fmt: skip
+    """Let an observer of unknown heading face what it reads, in all modes, and confront it anew."""
+    turned, sensor = False, tables.sensors[event.sensor]
+    for m in range(state.means.shape[0]):
+        belief, innovation = belief_of(state, tables, m), hypothesis.innovations[m]
+        if innovation.nis >= 0.0:
+            turned = face(belief, deferred_of(state, m), sensor, event, innovation, insists) or turned
+    if turned:
+        set_noise(hypothesis.innovations, hypothesis.R)
+        confront(state, tables, event, rows, hypothesis)
+
+
+@kernel()
+def loosen_observer(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis) -> float:
+    """Loosen the observer's belief in all modes for a landmark's reading; returns its excess over the gate.
+
+    If a turn alone explains the reading, the observer is turned; otherwise noise is added to its whole pose.
+    """
+    settings, means = tables.settings, state.means.copy()
+    gate = settings.gates[rows]
+    face_subject(state, tables, event, rows, hypothesis, True)
+    turns = least_nis(hypothesis.innovations) <= settings.wild_gates * gate
+    if not turns:
+        copy_matrix(means, state.means)
+        set_noise(hypothesis.innovations, hypothesis.R)
+        confront(state, tables, event, rows, hypothesis)
+    for m in range(means.shape[0]):
+        belief = belief_of(state, tables, m)
+        if turns:
+            note_turn(belief, event.observer, means[m])
+        elif hypothesis.innovations[m].nis >= 0.0:
+            loosen(belief, event, hypothesis.innovations[m], gate)
+    set_noise(hypothesis.innovations, hypothesis.R)
+    confront(state, tables, event, rows, hypothesis)
+    excess: float = least_nis(hypothesis.innovations) / gate
+    return max(excess, 1.0)
+
+
 @kernel(inlined=True)
 def correct_modes(state: State, tables: Tables, used: Hypothesis, excess: float) -> None:
     """Correct all modes that can use the observation, with S raised by `excess`."""
@@ -123,9 +166,12 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     set_noise(used.innovations, used.R)
     gate, fresh, excess = settings.gates[rows], subject.active == 0, 1.0
     joins, confirmed = fresh, subject.unconfirmed == 0
+    answering = answers_for(first, event)
+    answers, by_landmark, loosened = state.memory[answering], answering != event.subject, False
     if not fresh:
         if choose(state, tables, event, rows, unused_s, used, other):
             used, out.alternative_chosen = other, 1
+        face_subject(state, tables, event, rows, used, False)
         mode = likeliest(state.weights, used.innovations)
         if mode < 0:
             out.verdict = SINGULAR
@@ -141,13 +187,16 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
                 write_outcome(out, used.innovations[mode])
             elif out.verdict != PENDING:
                 return
-            joins = out.verdict == PENDING
-        if excess == 1.0:
-            agree(subject, event.at, rows)
-        elif not joins and first.entities[event.observer].kind == KIND_CAMERA:
-            doubt_velocity(subject)
+            if by_landmark:
+                excess, loosened = loosen_observer(state, tables, event, rows, used), True
+            else:
+                joins = out.verdict == PENDING
+        if excess == 1.0 and not loosened:
+            agree(answers, event.at, rows)
+        elif not joins and (by_landmark or first.entities[event.observer].kind == KIND_CAMERA):
+            doubt_velocity(answers)
     if out.verdict != TURNED:
-        out.verdict = INFLATED if excess > 1.0 else ACCEPTED
+        out.verdict = INFLATED if excess > 1.0 or loosened else ACCEPTED
     if joins:
         make_all(state)
         out.verdict = admit(state, tables, event, rows, used)
@@ -205,6 +254,6 @@ def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> No
         memory.noted_error = memory.slow_vx = memory.slow_vy = 0.0
     elif enters:
         memory.active = 1
-        memory.wild.count = memory.refused.count = memory.unconfirmed = 0
+        memory.wild.count = memory.astray.count = memory.refused.count = memory.unconfirmed = 0
         memory.corrected_at = event.at
         note_place(belief_of(state, tables, 0), deferred_of(state, 0), event.subject)

@@ -4,11 +4,14 @@ import math
 
 import numpy as np
 
+from groundstation.arrays import Vector
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, Settings
 from groundstation.estimation.linear import copy_matrix
+from groundstation.estimation.model_kernels import call_locate
 from groundstation.estimation.models.driven import SILENT_S
 from groundstation.estimation.records import (
     IMPLAUSIBLE,
+    KIND_LANDMARK,
     KIND_ROBOT,
     KIND_TARGET,
     MISTAKEN,
@@ -23,6 +26,8 @@ from groundstation.estimation.records import (
     Innovation,
     SensorRow,
     Streak,
+    X,
+    Y,
 )
 from groundstation.estimation.update import linearise
 from groundstation.kernel import kernel
@@ -33,6 +38,9 @@ _INNOVATION = Innovation.dtype
 _SAME_M = 0.5
 # Contradictions farther apart than this are not in a row.
 _IN_A_ROW_S = 5.0
+# A lost body is displaced from its belief by the same way from one contradiction to the next, to this [m], and as far
+# as body and belief drift apart meanwhile [m/s]; outliers are not.
+_SAME_WAY_M, _DRIFTS_M_S = 0.5, 1.0
 # For one observer: the time between giving up two robots' beliefs, the largest number, and the time after which one
 # more is permitted.
 _BETWEEN_S, _AT_MOST, _FORGOTTEN_S = 3.0, 3.0, 10.0
@@ -85,7 +93,7 @@ def fits_another(
 @kernel()
 def agree(memory: EntityMemory, at: float, rows: int) -> None:
     """Note a sighting within the gate: it ends all contradictions."""
-    memory.wild.count = memory.refused.count = memory.unconfirmed = 0
+    memory.wild.count = memory.astray.count = memory.refused.count = memory.unconfirmed = 0
     if rows == POSE:
         memory.keeps_heading, memory.heading_at = 1, at
 
@@ -114,8 +122,9 @@ def is_turned(
 
 @kernel()
 def is_doubted(memory: EntityMemory, settings: Settings, at: float) -> bool:
-    """Return whether the entity itself was seen far from its place, more than once and until just now."""
-    return memory.wild.count >= 2 and at - memory.wild.last <= settings.divergence_s
+    """Return whether the entity was seen far from its place, or saw landmarks so, more than once and until just now."""
+    seen = memory.wild.count >= 2 and at - memory.wild.last <= settings.divergence_s
+    return seen or (memory.astray.count >= 2 and at - memory.astray.last <= settings.divergence_s)
 
 
 @kernel()
@@ -126,6 +135,24 @@ def insists(streak: Streak, settings: Settings, at: float) -> bool:
     streak.count += 1
     streak.last = at
     return at - streak.since >= settings.divergence_s and streak.count >= settings.divergence_count
+
+
+@kernel()
+def is_outlier(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector) -> bool:
+    """Return whether a contradiction puts the subject elsewhere than most of its row, and count it against them.
+
+    If they have no majority, the row begins anew with the next one.
+    """
+    memory, start, pose = belief.memory[event.subject], belief.entities[event.subject].start, np.zeros(POSE)
+    if not call_locate(sensor.locate, (belief, sensor, event, z, pose)):
+        return False
+    ahead_x, ahead_y = pose[X] - belief.mean[start + X], pose[Y] - belief.mean[start + Y]
+    apart, waited_s = math.hypot(ahead_x - memory.wild_x, ahead_y - memory.wild_y), event.at - memory.wild.last
+    if memory.wild.count > 0 and waited_s <= _IN_A_ROW_S and apart > _SAME_WAY_M + _DRIFTS_M_S * waited_s:
+        memory.wild.count -= 1
+        return True
+    memory.wild_x, memory.wild_y = ahead_x, ahead_y
+    return False
 
 
 @kernel()
@@ -191,8 +218,13 @@ def blame(
     """Return why a wild observation is refused, or PENDING if the subject's belief must be given up for it.
 
     TURNED: it counts without its heading. belief: that of the first mode; hypothesis: its z and the first mode's noise
-    count.
+    count. A landmark has no belief: PENDING then means that of the robot which reads it (lost_observer.py).
     """
+    if belief.entities[event.subject].kind == KIND_LANDMARK:
+        if fits_another(belief, deferred, sensor, settings, event, rows, hypothesis):
+            return MISTAKEN
+        robot = belief.entities[event.observer].kind == KIND_ROBOT
+        return PENDING if robot and insists(belief.memory[event.observer].astray, settings, event.at) else IMPLAUSIBLE
     if is_doubted(belief.memory[event.observer], settings, event.at):
         return OBSERVER_DOUBTED
     if fits_another(belief, deferred, sensor, settings, event, rows, hypothesis):
@@ -202,6 +234,8 @@ def blame(
     if confirmed and is_turned(belief, deferred, sensor, settings, event, rows, hypothesis):
         subject.heading_at = event.at
         return TURNED
+    if confirmed and is_outlier(belief, sensor, event, hypothesis.z):
+        return IMPLAUSIBLE
     if not has_diverged(subject, settings, event.at):
         return IMPLAUSIBLE
     if robot and confirmed and is_hasty(belief.memory[event.observer], event.subject, event.at):

@@ -117,7 +117,8 @@ class EntityMemory(Record):
     how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed camera's surprises add
     to the error of the reported velocity; noted_error [m/s]: by how much that error was recently seen to exceed that of
     a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far beyond the
-    gate; refused: observations by which it would have joined if they had not contradicted their observer;
+    gate; wild_x, _y: where the last of them puts it, relative to its belief [m; world]; astray: landmarks read far
+    beyond the gate; refused: observations by which it would have joined if they had not contradicted their observer;
     corrected_at: last use of an observation; seen_variance: of the worse of x and y [m^2] right after it. gave_up,
     gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's sightings, the last time, and the
     last robot.
@@ -154,6 +155,9 @@ class EntityMemory(Record):
     noted_error: float
     unseen_s: float
     wild: Streak
+    wild_x: float
+    wild_y: float
+    astray: Streak
     refused: Streak
     corrected_at: float
     seen_variance: float

@@ -16,7 +16,7 @@ from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind
 from groundstation.estimation.linear import wrap
 from groundstation.estimation.model_kernels import MotionKernels
-from groundstation.estimation.models.driven import hold_velocity, position_density, world_velocity
+from groundstation.estimation.models.driven import SILENT_TURN_DENSITY, hold_velocity, position_density, world_velocity
 from groundstation.estimation.models.protocol import Vector3
 from groundstation.estimation.motion import depend, fade, mirror
 from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, X, Y, own_parameters
@@ -24,6 +24,9 @@ from groundstation.kernel import Record, kernel
 
 FORWARD_SCALE, TURN_DRAG, TURN_SCALE, TURN_OFFSET, RANGE_BIAS, RANGE_SCALE, BEARING_BIAS = range(4, 11)
 STANDS = 1e-3  # smaller commands count as zero [m/s, rad/s]
+# Readings beyond the gate make the commands doubtful: for this time, and this far from the robot they move a point as
+# much by turning as by driving [m].
+_DOUBT_S, _DOUBT_M = 1.0, 1.0
 
 
 class DriveParameters(Record):
@@ -62,10 +65,15 @@ _own = own_parameters(DriveParameters)
 
 @kernel()
 def add_drive_noise(
-    P: Matrix, start: int, p: DriveParameters, age_s: float, heading: float, forward: float, rate: float, dt: float
-) -> None:
-    """Add the noise of driving: along the heading with the speed, across by slip, and of the heading with both."""
-    idle = position_density(0.0, age_s, p.hold_s)
+    P: Matrix, start: int, p: DriveParameters, memory: EntityMemory, heading: float, forward: float, rate: float,
+    dt: float,
+) -> None:  # fmt: skip
+    """Add the noise of driving: along the heading with the speed, across by slip, and of the heading with both.
+
+    More of all while the commands are silent, or contradicted by readings.
+    """
+    astray = _DOUBT_S * memory.velocity_doubt * memory.velocity_doubt
+    idle = position_density(0.0, memory.odometry_age_s, p.hold_s) + astray
     along = (p.speed_density + p.speed_noise * abs(forward) + idle) * dt
     across = (p.slip_density * abs(forward) + idle) * dt + 1e-8 * dt
     c, n = math.cos(heading), math.sin(heading)
@@ -73,7 +81,8 @@ def add_drive_noise(
     P[start + 1, start + 1] += n * n * along + c * c * across
     P[start, start + 1] += c * n * (along - across)
     P[start + 1, start] += c * n * (along - across)
-    P[start + YAW, start + YAW] += (p.rate_density + p.turn_noise * abs(rate) + p.sway_noise * abs(forward)) * dt
+    turning = p.rate_density + p.turn_noise * abs(rate) + p.sway_noise * abs(forward) + astray / _DOUBT_M**2
+    P[start + YAW, start + YAW] += (turning + (SILENT_TURN_DENSITY if memory.odometry_age_s > p.hold_s else 0.0)) * dt
 
 
 @kernel()
@@ -111,7 +120,7 @@ def predict_commanded_robot(belief: Belief, e: int, dt: float) -> None:
     fade(mean, P, start, size, RANGE_BIAS, p.range_std, dt / p.range_tau_s)
     fade(mean, P, start, size, RANGE_SCALE, p.range_scale_std, dt / p.range_tau_s)
     fade(mean, P, start, size, BEARING_BIAS, p.bearing_std, dt / p.bearing_tau_s)
-    add_drive_noise(P, start, p, memory.odometry_age_s, heading, forward, rate, dt)
+    add_drive_noise(P, start, p, memory, heading, forward, rate, dt)
     mirror(P, start, size, size)
 
 
@@ -123,6 +132,7 @@ def begin_commanded_robot(
     memory, p = belief.memory[e], _own(belief.entities[e])
     forward, rate = memory.held_vx, memory.yaw_rate
     hold_velocity(odometry, memory, p.hold_s, step_s)
+    memory.velocity_doubt *= math.exp(-step_s / _DOUBT_S)
     if odometry.velocity_count > 0.0:
         memory.commanded_vx, memory.commanded_rate = memory.held_vx, memory.yaw_rate
     elif memory.odometry_age_s > p.hold_s:

@@ -86,21 +86,25 @@ def prepare_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, z:
 
 @kernel()
 def locate_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, pose: Vector) -> bool:
-    """Write the subject's place [world]; its heading is unknown. Range or bearing alone cannot place anything."""
+    """Write the subject's place [world], and its heading as believed so far: readings do not show it.
+
+    Range or bearing alone cannot place anything.
+    """
     p = _own(sensor)
     if p.range_row < 0 or p.bearing_row < 0:
         return False
-    mean, start = belief.mean, belief.entities[event.observer].start
+    mean, start, subject = belief.mean, belief.entities[event.observer].start, belief.entities[event.subject]
     direction = mean[start + YAW] + z[p.bearing_row]
     offset = np.empty(3)
-    marker_offset(mean, belief.entities[event.subject], event, 0.0, offset)
+    heading = mean[subject.start + subject.at_yaw] if subject.at_yaw >= 0 else 0.0
+    marker_offset(mean, subject, event, heading, offset)
     way = z[p.range_row]
     if p.is_depth != 0:
         way /= max(math.cos(z[p.bearing_row]), _LEAST_COS)
     pose[X] = mean[start + X] + way * math.cos(direction) - offset[X]
     pose[Y] = mean[start + Y] + way * math.sin(direction) - offset[Y]
     pose[Z] = mean[start + Z]
-    pose[YAW] = 0.0
+    pose[YAW] = heading
     return True
 
 

@@ -147,6 +147,25 @@ def note_place(belief: Belief, deferred: Deferred, e: int) -> None:
         belief.memory[e].seen_variance = variance
 
 
+@kernel(inlined=True)
+def judge(belief: Belief, event: EventRow, rows: int, agrees: bool, joins: bool) -> None:
+    """Note whether an observation agrees with the belief that it tests, or what its surprise makes doubtful."""
+    answering = answers_for(belief, event)
+    if agrees:
+        agree(belief.memory[answering], event.at, rows)
+    elif not joins and (answering != event.subject or belief.entities[event.observer].kind == KIND_CAMERA):
+        doubt_velocity(belief.memory[answering])
+
+
+@kernel(inlined=True)
+def note_use(state: State, first: Belief, event: EventRow) -> None:
+    """Note that the subject was corrected by the event."""
+    subject = state.memory[event.subject]
+    forget_noted_error(subject, event.at)
+    note_place(first, deferred_of(state, 0), event.subject)
+    subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
+
+
 @kernel()
 def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
     """Correct by one observation, or record why not: gate, choice of hypothesis, joining, re-initialisation."""
@@ -164,10 +183,8 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     if out.verdict != PENDING:
         return
     set_noise(used.innovations, used.R)
-    gate, fresh, excess = settings.gates[rows], subject.active == 0, 1.0
+    gate, fresh, excess, loosened = settings.gates[rows], subject.active == 0, 1.0, False
     joins, confirmed = fresh, subject.unconfirmed == 0
-    answering = answers_for(first, event)
-    answers, by_landmark, loosened = state.memory[answering], answering != event.subject, False
     if not fresh:
         if choose(state, tables, event, rows, unused_s, used, other):
             used, out.alternative_chosen = other, 1
@@ -187,14 +204,11 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
                 write_outcome(out, used.innovations[mode])
             elif out.verdict != PENDING:
                 return
-            if by_landmark:
-                excess, loosened = loosen_observer(state, tables, event, rows, used), True
-            else:
-                joins = out.verdict == PENDING
-        if excess == 1.0 and not loosened:
-            agree(answers, event.at, rows)
-        elif not joins and (by_landmark or first.entities[event.observer].kind == KIND_CAMERA):
-            doubt_velocity(answers)
+            loosened = answers_for(first, event) != event.subject
+            joins = out.verdict == PENDING and not loosened
+            if loosened:
+                excess = loosen_observer(state, tables, event, rows, used)
+        judge(first, event, rows, excess == 1.0 and not loosened, joins)
     if out.verdict != TURNED:
         out.verdict = INFLATED if excess > 1.0 or loosened else ACCEPTED
     if joins:
@@ -211,9 +225,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     if joins:
         make_all(state)  # a diffuse prior is too wide for deferred corrections beside it
     weigh(state.weights, used.innovations, rows, excess)
-    forget_noted_error(subject, event.at)
-    note_place(first, deferred_of(state, 0), event.subject)
-    subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
+    note_use(state, first, event)
 
 
 @kernel()

@@ -318,24 +318,3 @@ def test_a_velocity_that_the_driver_doubts_is_doubted_though_the_attitude_is_not
             yaw_rad=0.0, roll_rad=0.0, pitch_rad=0.0, reset=0,
         )  # fmt: skip
         assert intake.motion(odometry, header.stamp_ns).velocity_std_m_s == pytest.approx(std_m_s)
-
-
-def heading_by_sparse_samples(rng: np.random.Generator) -> tuple[float, float]:
-    """Return the error of the heading of a body that shakes, sampled at 10 Hz for 10 s [rad], and its stated walk."""
-    attitude, rate, turned, force = InertialAttitude(), 0.0, 0.0, (0.0, 0.0, STANDARD_GRAVITY_M_S2)
-    for ms in range(10_001):
-        rate += -rate * 0.05 + 0.3 * math.sqrt(0.1) * rng.standard_normal()
-        turned += rate / 1000 if ms > 0 else 0.0
-        if ms % 100 == 0:
-            attitude.take_imu(START + ms * 1_000_000, (0.0, 0.0, rate), force, standing=False)
-    now = attitude.at(START + 10_000 * 1_000_000)
-    assert now is not None
-    return difference(now.yaw_rad, turned), now.yaw_std_rad
-
-
-def test_a_heading_by_sparse_samples_is_stated_as_uncertain_as_it_is() -> None:
-    """What a body turns between two samples, faster than it is sampled, is not seen: 40 runs."""
-    rng, unlearnt = np.random.default_rng(11), GyroBias().yaw_std_rad
-    errors, stated = zip(*(heading_by_sparse_samples(rng) for _ in range(40)), strict=True)
-    walk = math.sqrt(float(np.mean(np.square(stated))) - unlearnt**2) * math.sqrt(10.0)
-    assert 0.75 <= walk / float(np.sqrt(np.mean(np.square(errors)))) <= 1.6

@@ -78,8 +78,9 @@ def face(
     yaw = entity.start + entity.at_yaw
     for i in range(innovation.prediction.size):
         by_subject = innovation.prediction.H_subject[i, subject.at_yaw] if subject.at_yaw >= 0 else 0.0
-        unknown = insists or variance_of(belief.P, deferred, yaw) > _UNKNOWN_RAD2
-        if sensor.is_angle[i] != 0 and by_subject == 0.0 and unknown:
+        if sensor.is_angle[i] == 0 or by_subject != 0.0:
+            continue
+        if insists or variance_of(belief.P, deferred, yaw) > _UNKNOWN_RAD2:
             belief.mean[yaw] = wrap(belief.mean[yaw] + innovation.y[i])
             turned = True
     return turned

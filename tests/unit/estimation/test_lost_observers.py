@@ -37,7 +37,7 @@ class Team:
         posts = {name: Landmark((*place, 0.0)) for name, place in LANDMARKS.items()}
         # The posts come last: a block beyond theirs would lie beyond the state.
         robots = {name: CommandedRobot(turn_drag_m=0.0, response_s=0.0, lag_s=0.01) for name in COURSES}
-        self.filter = FixedLagFilter(EstimatorParameters(robots | posts, eyes, step_s=0.02, max_lateness_s=0.1))
+        self.filter = FixedLagFilter(EstimatorParameters({**robots, **posts}, eyes, step_s=0.02, max_lateness_s=0.1))
         self.poses = {name: np.array(course[:3]) for name, course in COURSES.items()}
         self.now, self._faults, self._rng = START, faults, np.random.default_rng(seed)
         for name, (x, y, yaw, _, _) in COURSES.items():

@@ -26,8 +26,8 @@ def heading_by_sparse_samples(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def test_a_heading_by_sparse_samples_is_stated_as_uncertain_as_it_is() -> None:
-    """What a body turns between two samples, faster than it is sampled, is not seen: 40 runs."""
+    """What a body turns between two samples, faster than it is sampled, is not seen: 100 runs."""
     rng, unlearnt = np.random.default_rng(11), GyroBias().yaw_std_rad
-    errors, stated = zip(*(heading_by_sparse_samples(rng) for _ in range(40)), strict=True)
+    errors, stated = zip(*(heading_by_sparse_samples(rng) for _ in range(100)), strict=True)
     walk = math.sqrt(float(np.mean(np.square(stated))) - unlearnt**2) * math.sqrt(10.0)
-    assert 0.75 <= walk / float(np.sqrt(np.mean(np.square(errors)))) <= 1.6
+    assert 0.85 <= walk / float(np.sqrt(np.mean(np.square(errors)))) <= 1.25  # about 1.06 expected

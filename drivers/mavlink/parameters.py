@@ -3,6 +3,7 @@
 Reasons and sources, one by one: docs/reference/mavlink.md 5.4.1. Checked with PX4 1.16 and ArduCopter 4.6.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -43,7 +44,9 @@ class Needed:
         return (self.name, *self.aliases)
 
     def takes(self, value: float) -> bool:
-        """Return whether a value is acceptable."""
+        """Return whether a value is acceptable; one that is no number never is."""
+        if not math.isfinite(value):
+            return False
         if self.bits:
             return round(value) & self.bits == self.bits
         in_range = _lies_in(self.accepted or (self.value, self.value), value)
@@ -55,7 +58,9 @@ class Needed:
 
     def mending(self, value: float | None) -> "Needed":
         """Return it with the value to write in place of another one."""
-        return self if value is None or not self.bits else replace(self, value=round(value) | self.bits)
+        if value is None or not self.bits or not math.isfinite(value):
+            return self
+        return replace(self, value=round(value) | self.bits)
 
     @property
     def wish(self) -> str:

@@ -6,6 +6,7 @@ already set is neither changed nor reported, so it is requested as well. PX4 fli
 for its answer.
 """
 
+import math
 from collections import Counter, deque
 from collections.abc import Mapping
 from functools import partial
@@ -160,7 +161,7 @@ class MavlinkSession:
         requests.forget()
 
     def hear_parameter(self, message: service.ParamValue) -> None:
-        """Take a parameter's value; raises WireError."""
+        """Take a parameter's value."""
         if message.param_id in self._by_name:
             value = value_from_carried(self._flavour, message.param_value, message.param_type)
             before = self._found.get(message.param_id, value)
@@ -168,7 +169,7 @@ class MavlinkSession:
             if message.param_id == parameters.LOSS:
                 self.tells_lost_transmitter = value != 0
             wanted = self._by_name[message.param_id]
-            if value != before:
+            if value != before and not (math.isnan(value) and math.isnan(before)):
                 self._note_change(wanted, message.param_id, before, value)
             self._note_doubtful(wanted, {message.param_id: value})
 

@@ -10,7 +10,6 @@ from drivers.mavlink.identity import other_flavour
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import id_of
 from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, MavCmd, SensorBits
@@ -124,8 +123,5 @@ class ParameterSetup:
                         continue
                     if answer.param_id == message.param_id:
                         self._answers[wanted.name] = answer
-                        try:
-                            return value_from_carried(self._flavour, answer.param_value, answer.param_type)
-                        except WireError:
-                            return None
+                        return value_from_carried(self._flavour, answer.param_value, answer.param_type)
         return None

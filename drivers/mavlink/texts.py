@@ -14,6 +14,8 @@ _KEPT_MS = 10_000
 _PIECES = 8
 _NEXT_WITHIN_NS = NS_PER_S // 2
 _RECENT_S = 2
+_RESTARTED = "it restarted, or two vehicles share its system id"
+_STOOD = "it stood still, or its telemetry was held back"
 # A refusal is reported only after its STATUSTEXT: the COMMAND_ACK arrives first.
 _EXPLAIN_NS = 700 * NS_PER_MS
 # An older text explains no present event; ArduPilot's comes just after the heartbeat with the mode.
@@ -122,11 +124,12 @@ class BootClock:
     """Compares a vehicle's time since power-on with our own clock.
 
     Its stamps serve no other purpose: measurements are stamped on arrival. restarted: its clock began anew since this
-    was last set to False.
+    was last set to False; why: what the last jump means, for the operator.
     """
 
     def __init__(self) -> None:
         self.restarted = False
+        self.why = ""
         self._last: tuple[int, int] | None = None
         self._late_ms = 0
 
@@ -139,6 +142,8 @@ class BootClock:
         if before is None:
             return 0
         jump = boot_ms - before[1] - (now_ns - before[0]) // 1_000_000
+        # A clock that goes on after a pause, only behind, is that of no other vehicle.
+        self.why = _STOOD if jump < 0 and boot_ms >= before[1] else _RESTARTED
         if boot_ms < before[1] - _JUMP_MS:
             self.restarted, self._late_ms = True, 0
             return jump

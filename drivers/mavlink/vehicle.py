@@ -72,7 +72,7 @@ class MavlinkVehicle:
         self._refused: Counter[str] = Counter()
         self._said, self._boot_clock = Texts(), BootClock()
         self._readiness = Readiness(self.flavour, self._session, self._requests, self._said)
-        self._jumps: deque[int] = deque(maxlen=8)
+        self._jumps: deque[tuple[int, str]] = deque(maxlen=8)
         self._refusals = Refusals(self._said)
 
     def use(self, link: MavlinkLink) -> None:
@@ -118,7 +118,7 @@ class MavlinkVehicle:
     def _moved(self, now_ns: int, message: telemetry.LocalPositionNed, known: LatestTelemetry) -> LatestTelemetry:
         if (jump_ms := self._boot_clock.take(now_ns, message.time_boot_ms)) != 0:
             self._refused["clock_jump"] += 1
-            self._jumps.append(jump_ms)
+            self._jumps.append((jump_ms, self._boot_clock.why))
         attitude = known.attitude_at(now_ns)
         if known.attitude is None or attitude is None:
             return known
@@ -246,15 +246,12 @@ class MavlinkVehicle:
                 self.orders.events.append((MavSeverity.WARNING, text))
         while self._values:
             value = self._values.popleft()
-            try:
-                if isinstance(value, service.ParamValue):
-                    self._session.hear_parameter(value)
-                elif isinstance(value, telemetry.AutopilotVersion):
-                    self._session.hear_version(value.flight_sw_version, identity.serial_number_of(value))
-                else:
-                    self._session.hear_origin()
-            except WireError as error:
-                self._refused[error.reason] += 1
+            if isinstance(value, service.ParamValue):
+                self._session.hear_parameter(value)
+            elif isinstance(value, telemetry.AutopilotVersion):
+                self._session.hear_version(value.flight_sw_version, identity.serial_number_of(value))
+            else:
+                self._session.hear_origin()
         self._take_texts(now_ns)
 
     def _take_texts(self, now_ns: int) -> None:
@@ -265,9 +262,8 @@ class MavlinkVehicle:
             self.orders.said.take(at_ns, text)
             events.append((severity, text))
         while self._jumps:
-            jump_s = self._jumps.popleft() / 1000
-            why = "it restarted, or two vehicles share its system id"
-            events.append((MavSeverity.WARNING, f"its clock jumped by {jump_s:.0f} s: {why}"))
+            jump_ms, why = self._jumps.popleft()
+            events.append((MavSeverity.WARNING, f"its clock jumped by {jump_ms / 1000:.0f} s: {why}"))
         events.extend((MavSeverity.WARNING, text) for text in self._refusals.told(now_ns, self._requests.failures))
 
     def _feed(self, now_ns: int, known: LatestTelemetry) -> list[tuple[object, ...]]:

@@ -1,12 +1,10 @@
 """Encoding of parameters: PX4 puts the bits of an integer into the float, ArduPilot its value.
 
-WIRE: docs/reference/mavlink.md 5.4.
+WIRE: docs/reference/mavlink.md 5.4. A PX4 takes and keeps what is no number, and tells it (1.16, 5.15).
 """
 
-import math
 import struct
 
-from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import Flavour
 
 INT32, REAL32 = 6, 9
@@ -22,9 +20,7 @@ def carried_from_value(flavour: Flavour, value: float, kind: int) -> float:
 
 
 def value_from_carried(flavour: Flavour, carried: float, kind: int) -> float:
-    """Return the value in a param_value; raises WireError when it is no number."""
+    """Return the value in a param_value, which may be no number."""
     if flavour is Flavour.PX4 and kind in _INTEGERS:
         return float(struct.unpack("<i", struct.pack("<f", carried))[0])
-    if not math.isfinite(carried):
-        raise WireError("not_finite", "parameter")
     return float(carried)

@@ -1,5 +1,7 @@
 """Reading parameters: one unknown to the firmware is named, and the others are still read."""
 
+import math
+
 from drivers.mavlink.identity import serial_number_of
 from drivers.mavlink.parameters import needed
 from drivers.mavlink.requests import Requests
@@ -196,6 +198,19 @@ def test_a_parameter_that_somebody_else_changes_is_told_once_with_its_need() -> 
     assert told.startswith("somebody changed its parameter GUID_TIMEOUT from 0.5 to 10, needs 0.1 to 0.5")
     session.hear_parameter(ParamValue("GUID_TIMEOUT", 0.4, REAL32, 1, 0))
     assert session.notes[-1].endswith("from 10 to 0.4")
+
+
+def test_a_parameter_that_is_no_number_is_told_and_forbids_a_take_off() -> None:
+    """A PX4 takes one from any station, and keeps it."""
+    session, requests = MavlinkSession(1, Flavour.PX4, {}, 255, GlobalOrigin()), Requests(1)
+    for needed_one in needed(Flavour.PX4, 255):
+        if needed_one.kind == REAL32:
+            session.hear_parameter(ParamValue(needed_one.name, needed_one.value, REAL32, 1, 0))
+    for _ in range(2):
+        session.hear_parameter(ParamValue("COM_OF_LOSS_T", math.nan, REAL32, 1, 0))
+    session.step(10_000 * MS, 0, requests)
+    assert session.problems[0].startswith("COM_OF_LOSS_T is nan, needs 0.3 to 1")
+    assert [text[:60] for text in session.notes] == ["somebody changed its parameter COM_OF_LOSS_T from 0.5 to nan"]
 
 
 def test_only_where_the_loss_of_a_transmitter_is_told_is_there_a_pilot() -> None:

@@ -1,8 +1,8 @@
 """Judges whether a flying vehicle is in our mode, and when to request that mode again. Pure.
 
 WIRE (docs/reference/mavlink.md 5.2): in flight PX4 takes OFFBOARD only while setpoints keep coming, so they come first.
-Its heartbeat, once a second, reports a change of mode late; its answer to the request is there at once. A PX4 answers
-twice, and the acceptance does not count if a refusal follows (docs/reference/mavlink.md 5.15).
+Its heartbeat, once a second, reports a change of mode late; its answer to the request is there at once. An acceptance
+does not count if a refusal follows (docs/reference/mavlink.md 5.15).
 """
 
 from drivers.mavlink.requests import Requests

@@ -11,8 +11,8 @@ _RETRY_NS = 500 * NS_PER_MS
 _TRIES = 4
 _SETTLE_NS = NS_PER_S
 _REFUSED_NS = NS_PER_S
-# WIRE (docs/reference/mavlink.md 5.15): PX4 answers these twice, in either order: its receiver accepts whatever it is,
-# its commander decides. A second answer comes within milliseconds; the rest is for the link.
+# WIRE (docs/reference/mavlink.md 5.15): PX4 1.16 answers once. Should a receiver accept whatever it is before its
+# commander decides, or a router repeat an answer, the second one comes within milliseconds; the rest is for the link.
 _ANSWERED_TWICE = frozenset((MavCmd.DO_SET_MODE,))
 _SECOND_NS = NS_PER_S
 

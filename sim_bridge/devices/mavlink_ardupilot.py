@@ -28,6 +28,7 @@ class ArduCopter(AutopilotFirmware):
     flavour = Flavour.ARDUPILOT
     guided = Mode.GUIDED
     landing = Mode.LAND
+    homeward = Mode.RTL
     arming_refusal = mode_refusal = MavResult.FAILED
     disarmed_text = "Disarming motors"
 

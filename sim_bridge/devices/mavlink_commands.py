@@ -71,11 +71,11 @@ class Commands:
             case MavCmd.COMPONENT_ARM_DISARM:
                 return self._arm(p), []
             case MavCmd.DO_SET_MODE:
-                # WIRE (PX4 1.15, source): its receiver accepts whatever it is, and then its commander answers.
-                first = [MavResult.ACCEPTED] if self._px4 else []
-                return [*first, firmware.order_mode(p)[0]], []
+                return [firmware.order_mode(p)[0]], []
             case MavCmd.NAV_TAKEOFF:
                 return [firmware.take_off(p[6] if math.isfinite(p[6]) else 0.0)[0]], []
+            case MavCmd.NAV_RETURN_TO_LAUNCH:
+                return [firmware.go_home()[0]], []
             case MavCmd.NAV_LAND:
                 return [firmware.land()[0]], []
             case MavCmd.DO_REPOSITION:

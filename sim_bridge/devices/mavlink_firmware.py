@@ -8,7 +8,7 @@ import math
 from collections import deque
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
-from drivers.mavlink.wire.names import FORCE, Flavour, Landed, MavResult
+from drivers.mavlink.wire.names import FORCE, Flavour, Landed, MavResult, MavState
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.devices.mavlink_setpoints import Velocity
@@ -30,6 +30,7 @@ class AutopilotFirmware:
     flavour: Flavour
     guided: int
     landing: int
+    homeward: int
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters, start_mode: int) -> None:
         self.copter, self.parameters = copter, parameters
@@ -81,6 +82,10 @@ class AutopilotFirmware:
         """Land here."""
         self.enter(self.landing)
         return _OK
+
+    def go_home(self) -> Answer:
+        """Fly home by itself, to land there."""
+        return self.set_mode(self.homeward)
 
     def take_off(self, height_m: float) -> Answer:
         """Climb to a height above the floor."""
@@ -202,6 +207,15 @@ class AutopilotFirmware:
         if not self.located:
             return "need position estimate"
         return "battery low" if self.copter.battery < _BATTERY_MIN else ""
+
+    @property
+    def passes_checks(self) -> bool:
+        """Return whether it says that it may be armed."""
+        return not self.health_fault()
+
+    def state(self, armed: bool, airborne: bool) -> int:
+        """Return its MAV_STATE: standing by, or active in the air."""
+        return MavState.ACTIVE if airborne else MavState.STANDBY
 
     # -- flavours -----------------------------------------------------------------------------------------------------
 

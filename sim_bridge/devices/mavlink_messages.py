@@ -95,7 +95,8 @@ class Speaker:
         """Return its type, flavour and mode."""
         armed, mode, _, airborne = self._status
         base = 1 | (128 if armed else 0)
-        return t.Heartbeat(QUADROTOR, self._firmware.flavour, base, mode, 4 if airborne else 3)
+        state = self._firmware.state(armed, airborne)
+        return t.Heartbeat(QUADROTOR, self._firmware.flavour, base, mode, state)
 
     def sys_status(self) -> Message:
         """Return health and battery."""
@@ -107,7 +108,7 @@ class Speaker:
         if self._firmware.hears_transmitter:
             healthy |= SensorBits.RC_RECEIVER
         ardupilot = isinstance(self._firmware, ArduCopter)
-        if (ardupilot or self._firmware.global_position) and not self._firmware.health_fault():
+        if self._firmware.passes_checks:
             healthy |= SensorBits.PREARM_CHECK
         present = healthy | SensorBits.VISION_POSITION | SensorBits.PREARM_CHECK
         if ardupilot:

@@ -40,6 +40,7 @@ _PX4_REALS: dict[str, float] = {
     "MIS_TAKEOFF_ALT": 2.5,
     "MPC_XY_VEL_MAX": 12.0,
     "MPC_Z_VEL_MAX_UP": 3.0,
+    "MPC_Z_V_AUTO_UP": 3.0,
 }
 _PX4_INDOOR: dict[str, float] = {
     "EKF2_GPS_CTRL": 0,
@@ -52,6 +53,7 @@ _PX4_INDOOR: dict[str, float] = {
     "SYS_HAS_GPS": 0,
     "COM_OBL_RC_ACT": 4,
     "EKF2_EVP_NOISE": 0.05,
+    "MPC_Z_V_AUTO_UP": 0.5,
     "COM_RC_IN_MODE": 0,
     "COM_RCL_EXCEPT": 4,
     "COM_FLTT_LOW_ACT": 1,

@@ -3,7 +3,7 @@
 import math
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
-from drivers.mavlink.wire.names import Flavour, MavResult, Px4Auto, Px4Main, px4_mode
+from drivers.mavlink.wire.names import Flavour, MavResult, MavState, Px4Auto, Px4Main, px4_mode
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_numbers import byte
 from sim_bridge.devices.mavlink_parameters import Parameters
@@ -21,11 +21,20 @@ _GRANULARITY_S, _NOTICED_S = 0.42, 0.1
 _SPOOL_S = 1.0
 _CLIMB_M_S, _REACHED_M = 1.0, 0.1
 _LOSS_MODES = {0: POSITION, 1: ALTITUDE, 2: px4_mode(Px4Main.STABILIZED), 4: LAND, 5: HOLD}
-_LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL))
-# Follow a target, precision landing, and modes of companion computers.
-_AUTO_MODES = frozenset(Px4Auto) | {8, 9} | frozenset(range(11, 19))
+_LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL), px4_mode(Px4Main.ACRO))
+MISSION = px4_mode(Px4Main.AUTO, Px4Auto.MISSION)
+RETURN = px4_mode(Px4Main.AUTO, Px4Auto.RETURN)
+# With the modes of companion computers.
+_AUTO_MODES = frozenset(Px4Auto) | frozenset(range(11, 19))
+_NAMES = {
+    POSITION: "Position", ALTITUDE: "Altitude", px4_mode(Px4Main.STABILIZED): "Stabilized", MISSION: "Mission",
+    OFFBOARD: "Offboard", HOLD: "Hold", RETURN: "Return", TAKE_OFF: "Takeoff",
+}  # fmt: skip
 # MAV_MODE_FLAG.
 _CUSTOM, _AUTO, _GUIDED, _STABILIZE, _MANUAL = 1, 4, 8, 16, 64
+# Measured: what a return does at once; its height is that of RTL_RETURN_ALT on a small field.
+_RETURN_M_S, _RETURN_M = 1.1, 5.0
+_UNFIT = "Arming denied: Resolve system health failures first"
 
 
 class Px4(AutopilotFirmware):
@@ -34,46 +43,62 @@ class Px4(AutopilotFirmware):
     flavour = Flavour.PX4
     guided = OFFBOARD
     landing = LAND
+    homeward = RETURN
     disarmed_text = "Disarmed by landing"
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
         super().__init__(copter, parameters, HOLD)
         self._climb_to_m: float | None = None
+        self._before_landing = HOLD
+
+    @property
+    def has_global_position(self) -> bool:
+        """Return whether it knows its place on the globe.
+
+        WIRE (PX4 1.16): an origin makes one of our positions, and so HOLD, RETURN and TAKE_OFF possible indoors.
+        """
+        return self.global_position or (self.origin is not None and self.located)
 
     def knows(self, mode: int) -> bool:
         """Return whether a mode exists."""
-        return mode in (HOLD, LAND, OFFBOARD, POSITION, TAKE_OFF, *_LEVEL)
+        main, sub = mode >> 16 & 0xFF, mode >> 24
+        return sub in _AUTO_MODES if main == Px4Main.AUTO else main in frozenset(Px4Main)
 
     def arming_fault(self) -> str:
-        """Return its reason not to arm now, or ""."""
+        """Return its reason not to arm now, or ""; WIRE (PX4 1.16): it names no missing setpoints."""
         fault = self.health_fault()
         if fault:
             return f"Arming denied: {fault}"
-        if self.mode != OFFBOARD and self.global_position:
-            return ""
-        if self.mode != OFFBOARD:
-            # WIRE (docs/reference/mavlink.md 2): Hold needs a global position, and indoors there is none.
-            return "Arming denied: Resolve system health failures first"
-        return "" if self.streams else "Arming denied: no offboard signal"
+        return "" if (self.streams if self.mode == OFFBOARD else self.has_global_position) else _UNFIT
+
+    def disarm(self, code: float) -> Answer:
+        """Stop the motors; WIRE (PX4 1.16): after a landing it is in the mode of before again."""
+        answer = super().disarm(code)
+        if not self.armed and self.mode in (LAND, RETURN):
+            self.mode = self._before_landing
+        return answer
+
+    def land(self) -> Answer:
+        """Land here, aloud."""
+        self.say(6, "Landing at current position")
+        return super().land()
 
     def take_off(self, height_m: float) -> Answer:
-        """Climb in AUTO.TAKEOFF, then hold; without a global position there is no such mode.
+        """Climb in AUTO.TAKEOFF, then hold; WIRE (PX4 1.16): taken in flight as well, and without a global position
+        refused only then.
 
         height_m: above sea level, as the command says; 0: MIS_TAKEOFF_ALT above the floor.
         """
-        if not self.global_position or self.satellites is None:
-            self.say(2, "Takeoff denied: no global position")
-            return MavResult.TEMPORARILY_REJECTED, "no global position"
-        height = self.satellites.height_of(height_m) if height_m else self.parameters["MIS_TAKEOFF_ALT"]
-        self.enter(TAKE_OFF)
-        self._climb_to_m = height
-        return MavResult.ACCEPTED, ""
+        answer = self.set_mode(TAKE_OFF)
+        if answer[0] is MavResult.ACCEPTED and height_m and self.satellites is not None:
+            self._climb_to_m = self.satellites.height_of(height_m)
+        return answer
 
     def order_mode(self, params: tuple[float, ...]) -> Answer:
         """Change the mode by base mode, main mode and sub-mode.
 
-        WIRE (PX4 1.15, source): a main mode that does not exist is accepted, and changes nothing; so is a base mode
-        that names none. Without a custom mode the flags of the base mode count.
+        WIRE (PX4 1.16): a main mode that does not exist is accepted, and changes nothing; so is a base mode that names
+        none. Without a custom mode the flags of the base mode count (source).
         """
         base, main, sub = map(byte, params[:3])
         if not base & _CUSTOM:
@@ -90,12 +115,24 @@ class Px4(AutopilotFirmware):
     def set_mode(self, mode: int) -> Answer:
         """Change the mode on request.
 
-        WIRE (docs/reference/mavlink.md 5.2): once armed, OFFBOARD is refused unless setpoints keep coming.
+        WIRE (docs/reference/mavlink.md 5.2): once armed, OFFBOARD is refused unless setpoints keep coming, and so is
+        each mode whose needs it has not.
         """
-        if mode == OFFBOARD and self.armed and self.setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
-            self.say(2, "Switching to Offboard is currently not available")
-            return MavResult.TEMPORARILY_REJECTED, "no offboard signal"
+        if self.armed and self.knows(mode) and not self._can_fly(mode):
+            if name := _NAMES.get(mode, ""):
+                self.say(2, f"Switching to {name} is currently not available")
+            return MavResult.TEMPORARILY_REJECTED, "not available"
+        self._failed = False
         return super().set_mode(mode)
+
+    def _can_fly(self, mode: int) -> bool:
+        if mode == OFFBOARD:
+            return self.setpoint_age_s <= self.parameters["COM_OF_LOSS_T"]
+        if mode == POSITION or mode in _LEVEL:
+            return self.transmitter
+        if mode in (HOLD, RETURN, TAKE_OFF):
+            return self.has_global_position
+        return mode != MISSION  # there is none
 
     def reposition(self, parameters: tuple[float, ...]) -> Answer:
         """Hold here if no place is named; WIRE (docs/reference/mavlink.md 5.11): QGroundControl's Pause."""
@@ -106,11 +143,16 @@ class Px4(AutopilotFirmware):
     def enter(self, mode: int) -> None:
         """Change the mode, which ends a take-off; AUTO.TAKEOFF without a height climbs to that of the parameter."""
         self._climb_to_m = self.parameters["MIS_TAKEOFF_ALT"] if mode == TAKE_OFF else None
+        if mode not in (LAND, RETURN):
+            self._before_landing = mode
         super().enter(mode)
 
     def step(self, now_s: float, ground_silence_s: float) -> None:
         """Climb when asked to, then watch over time-outs."""
         super().step(now_s, ground_silence_s)
+        if self.armed and self.mode == RETURN and self.copter.airborne:
+            climbs = self.copter.estimate.position[2] < _RETURN_M
+            self.copter.fly((0.0, 0.0, _RETURN_M_S if climbs else 0.0), 0.0)
         if not self.armed or self._climb_to_m is None or now_s - self._armed_s < _SPOOL_S:
             return
         if self.copter.estimate.position[2] < self._climb_to_m - _REACHED_M:
@@ -155,6 +197,18 @@ class Px4(AutopilotFirmware):
     def _fail(self, mode: int) -> None:
         self.say(2, "Failsafe activated")
         self.enter(mode)
+        self._failed = True
+
+    @property
+    def passes_checks(self) -> bool:
+        """WIRE (PX4 1.16): PREARM_CHECK is healthy indoors, once an origin was set."""
+        return self.has_global_position and super().passes_checks
+
+    def state(self, armed: bool, airborne: bool) -> int:
+        """WIRE (PX4 1.16): active from arming on, critical in a failsafe, and before its checks pass none of them."""
+        if armed:
+            return MavState.CRITICAL if self._failed else MavState.ACTIVE
+        return MavState.UNINIT if self.arming_fault() else MavState.STANDBY
 
     def disarm_after_s(self) -> float:
         """Return the time on the floor after which the motors stop [s]."""

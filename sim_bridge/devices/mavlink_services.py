@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from drivers.mavlink.wire import flight as f
 from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
-from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.file_transfer import refusal
 from drivers.mavlink.wire.frames import Message, ReceivedFrame
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavCmd
@@ -124,8 +123,8 @@ class Services:
         return names[index] if 0 <= index < len(names) else ""
 
     def _takes(self, message: s.ParamSet) -> bool:
-        # WIRE (source): PX4 1.15 wants the parameter's own type; ArduPilot 4.5 has its own, and wants a number. Neither
-        # answers otherwise.
+        # WIRE: PX4 1.16 wants the parameter's own type, and takes what is no number. ArduPilot 4.5 (source) has its
+        # own, and wants a number. Neither answers otherwise.
         if self._px4:
             return message.param_type == self._firmware.parameters.kind(message.param_id)
         return math.isfinite(message.param_value)
@@ -133,10 +132,7 @@ class Services:
     def _write(self, message: s.ParamSet) -> None:
         parameters = self._firmware.parameters
         kind = parameters.kind(message.param_id)
-        try:
-            value = value_from_carried(self._firmware.flavour, message.param_value, kind)
-        except WireError:
-            return
+        value = value_from_carried(self._firmware.flavour, message.param_value, kind)
         parameters.values[message.param_id] = value
 
     # -- position from outside ----------------------------------------------------------------------------------------

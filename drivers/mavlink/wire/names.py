@@ -69,8 +69,11 @@ class MavResult(IntEnum):
 
 
 class MavState(IntEnum):
-    """MAV_STATE: a failsafe, an emergency, and the ends of a flight, of which the second is also the greatest."""
+    """MAV_STATE: on the floor, in the air, in a failsafe or an emergency, and the ends of a flight; 8 is the last."""
 
+    UNINIT = 0
+    STANDBY = 3
+    ACTIVE = 4
     CRITICAL = 5
     EMERGENCY = 6
     POWEROFF = 7
@@ -147,6 +150,8 @@ class Px4Auto(IntEnum):
     MISSION = 4
     RETURN = 5
     LAND = 6
+    FOLLOW = 8
+    PRECISION_LAND = 9
 
 
 class CopterMode(IntEnum):
@@ -194,6 +199,15 @@ _HOMEWARD = {
 def flies_home(flavour: Flavour, custom_mode: int) -> bool:
     """Return whether it flies to its home by itself in a mode."""
     return custom_mode in _HOMEWARD[flavour]
+
+
+# WIRE (PX4 1.16): in flight as well it climbs to MIS_TAKEOFF_ALT, 2.5 m, or to 10 m to look for a landing target.
+_UPWARD = frozenset(px4_mode(Px4Main.AUTO, sub) for sub in (Px4Auto.TAKE_OFF, Px4Auto.PRECISION_LAND))
+
+
+def climbs_first(flavour: Flavour, custom_mode: int) -> bool:
+    """Return whether a flying vehicle begins a mode with a climb of its own, a return home aside."""
+    return flavour is Flavour.PX4 and custom_mode in _UPWARD
 
 
 _STICKS = {

@@ -138,7 +138,7 @@ def _ends(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  forgets=SLOWLY, modes=frozenset({DriverMode.CUT})),
         Failsafe(Condition.LANDS_BY_ITSELF, Reaction.LAND, "the vehicle lands by itself"),
         # A return begins with a climb, out of all views and to the ceiling.
-        Failsafe(Condition.FLIES_HOME, Reaction.LAND, "it flies home by itself, in {why}"),
+        Failsafe(Condition.FLIES_HOME, Reaction.LAND, "it {why}"),
     )  # fmt: skip
 
 

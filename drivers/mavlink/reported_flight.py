@@ -5,7 +5,7 @@ from drivers.mavlink.commands import Orders
 from drivers.mavlink.identity import Misfit
 from drivers.mavlink.latest_telemetry import FRESH_NS, HEARTBEAT_NS, LatestTelemetry
 from drivers.mavlink.lift_off import credible
-from drivers.mavlink.wire.names import ARMED, Flavour, Landed, MavState, flies_home, mode_name
+from drivers.mavlink.wire.names import ARMED, Flavour, Landed, MavState, climbs_first, flies_home, mode_name
 from groundstation.bus.messages import FlightState
 from groundstation.time_units import NS_PER_S
 
@@ -104,7 +104,11 @@ class ReportedFlight:
         return not (stops or self._orders.climbs_by_itself(now_ns))
 
     def homeward(self, now_ns: int, known: LatestTelemetry) -> str:
-        """Return the mode in which it flies home by itself, or ""."""
-        aloft = known.base_mode & ARMED and self.landed(now_ns, known) != Landed.ON_GROUND
-        home = aloft and flies_home(self._flavour, known.custom_mode)
-        return mode_name(self._flavour, known.custom_mode) if home else ""
+        """Return how it flies home or climbs by itself, and in which mode, or ""."""
+        if not known.base_mode & ARMED or self.landed(now_ns, known) == Landed.ON_GROUND:
+            return ""
+        home = flies_home(self._flavour, known.custom_mode)
+        if not home and not climbs_first(self._flavour, known.custom_mode):
+            return ""
+        name = mode_name(self._flavour, known.custom_mode)
+        return f"{'flies home' if home else 'climbs'} by itself, in {name}"

@@ -112,13 +112,13 @@ _PX4 = (
     Needed("COM_IMB_PROP_ACT", 0, _NO_RETURN, others=(-1, 2), optional=True),
     Needed(
         "MPC_Z_V_AUTO_UP",
-        0.5,
-        "it climbs on when it is landed from a climb that others ordered",
+        1.0,
+        "faster it climbs on for metres when it is landed from a climb that others ordered",
         REAL32,
-        accepted=(0.5, 1.0),
+        accepted=(0.8, 1.2),
         flown=(0.5, 8.0),
         optional=True,
-    ),
+    ),  # fmt: skip
     Needed("MPC_LAND_CRWL", 0.6, "the last metre of a landing, on which it may have no position", REAL32, (0.3, 1.0)),
     Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32, accepted=(0.1, 4.0)),
 )

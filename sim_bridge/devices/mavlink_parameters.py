@@ -53,7 +53,7 @@ _PX4_INDOOR: dict[str, float] = {
     "SYS_HAS_GPS": 0,
     "COM_OBL_RC_ACT": 4,
     "EKF2_EVP_NOISE": 0.05,
-    "MPC_Z_V_AUTO_UP": 0.5,
+    "MPC_Z_V_AUTO_UP": 1.0,
     "COM_RC_IN_MODE": 0,
     "COM_RCL_EXCEPT": 4,
     "COM_FLTT_LOW_ACT": 1,

@@ -78,6 +78,7 @@ def _lies_in(span: tuple[float, float], value: float) -> bool:
 
 
 _NO_RETURN = "a return would climb first, to the ceiling"
+_CLIMBS_ON = "faster, it climbs on for metres when it is landed from a climb that others ordered"
 _CENTRE = "our positions are those of its centre"
 LOSS = "FS_THR_ENABLE"  # how an ArduPilot reacts to the loss of its transmitter; 0: not at all, and tells nobody
 # WIRE (ArduCopter 4.7, radio.cpp): with 0 a receiver without its transmitter counts as healthy for ever.
@@ -110,15 +111,7 @@ _PX4 = (
     Needed("NAV_DLL_ACT", 0, _NO_RETURN, others=(1, 3)),
     Needed("COM_ACT_FAIL_ACT", 0, _NO_RETURN, others=(1, 2), optional=True),
     Needed("COM_IMB_PROP_ACT", 0, _NO_RETURN, others=(-1, 2), optional=True),
-    Needed(
-        "MPC_Z_V_AUTO_UP",
-        1.0,
-        "faster it climbs on for metres when it is landed from a climb that others ordered",
-        REAL32,
-        accepted=(0.8, 1.2),
-        flown=(0.5, 8.0),
-        optional=True,
-    ),  # fmt: skip
+    Needed("MPC_Z_V_AUTO_UP", 1.0, _CLIMBS_ON, REAL32, (0.8, 1.2), flown=(0.5, 8.0), optional=True),
     Needed("MPC_LAND_CRWL", 0.6, "the last metre of a landing, on which it may have no position", REAL32, (0.3, 1.0)),
     Needed("COM_DISARM_LAND", 2.0, "motors off after touch-down", REAL32, accepted=(0.1, 4.0)),
 )

@@ -85,7 +85,7 @@ class AttitudeControl:
         told, seen = report.velocity_m_s if report.told and not report.repeats else None, decision.seen_m_s
         commanded_m_s = self._loop.commanded_m_s
         if self._doubt.step(now_ns, decision.action, told, seen, commanded_m_s) and seen is not None:
-            self._loop.hold((*seen, 0.0), dt_s)  # its own velocity gives no speed from which to brake it
+            self._loop.recover(seen, dt_s)  # its own velocity gives no speed from which to brake it
         if not (self._doubt.blind and report.able):
             return report
         return report._replace(blind=True, flowless=report.flowless or not report.repeats)

@@ -81,6 +81,7 @@ class Axis:
         self._lately = deque([self.speed_m_s], self._gains.seen_ticks)
         self._unseen = self._push_m_s2 = 0.0
         self.flown_m_s = self.speed_m_s
+        self._flown_lately = deque([self.flown_m_s], self._gains.seen_ticks)
         self._expected_m_s = self.flown_m_s
         self._unexplained_m = 0.0
 
@@ -120,6 +121,13 @@ class Axis:
         error = seen_m_s - sum(self._lately) / len(self._lately)
         self._shift(min(1.0, max(self._unseen, self._gains.seen_rad_s * dt_s)) * error)
         self._unseen = 0.0
+
+    def recover(self, seen_m_s: float) -> None:
+        """Forget the measured speeds: take the mean one that cameras saw over the last calls, and commands since."""
+        off_m_s = seen_m_s - sum(self._flown_lately) / len(self._flown_lately)
+        self.speed_m_s = self.flown_m_s + off_m_s
+        self._lately = deque((speed + off_m_s for speed in self._flown_lately), self._gains.seen_ticks)
+        self._unseen = self._unexplained_m = 0.0
 
     def _shift(self, correction_m_s: float) -> None:
         self.speed_m_s += correction_m_s
@@ -226,6 +234,7 @@ class Axis:
         least = (slowest - self.flown_m_s) * gains.reference_rad_s - slower
         asked = min(max(acceleration_m_s2, least), most)
         self.flown_m_s += (asked + slower) * dt_s
+        self._flown_lately.append(self.flown_m_s)
         return asked
 
     def ask(self, acceleration_m_s2: float) -> None:

@@ -91,6 +91,15 @@ class VelocityLoop:
         self._held_m_s = before_x + share * (x - before_x), before_y + share * (y - before_y)
         return HOVER
 
+    def recover(self, seen_m_s: tuple[float, float], dt_s: float) -> None:
+        """Take the speed from cameras (forward and left), whose mean is half a second old, and commands since then."""
+        if not self._flying:
+            self.hold((*seen_m_s, 0.0), dt_s)
+            return
+        self._stands_off_m = 0.0
+        for axis, seen in zip(self._axes, seen_m_s, strict=True):
+            axis.recover(seen)
+
     def stand(self, force_m_s2: tuple[float, float], dt_s: float) -> None:
         """Learn the accelerometer readings (forward, left) of a standing drone."""
         for axis, force in zip(self._axes, force_m_s2, strict=True):

@@ -4,7 +4,7 @@ import pytest
 
 from drivers.ardrone.attitude_control import AttitudeControl, MotionReport
 from drivers.ardrone.settings import ArDroneLimits
-from drivers.ardrone.velocity_loop import AttitudeRequest
+from drivers.ardrone.velocity_loop import AttitudeRequest, VelocityLoop
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 
 TURN_NS = 25_000_000
@@ -125,6 +125,43 @@ def test_one_that_cameras_find_blind_in_flight_is_braked_from_the_speed_that_the
         turns(Action.FLY, STILL, 0.025, velocity_m_s=(0.2, 0.0, 0.0), seen_m_s=(0.25, 0.0))
     braking = turns(Action.HOVER, STILL, 0.1, seen_m_s=(0.25, 0.0)).pitch_rad
     assert braking < -0.03
+
+
+TOLD = SOUND._replace(velocity_m_s=(0.4, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("seen_m_s", "seconds", "blind"), [(0.15, 1.5, True), (0.15, 0.7, False), (0.25, 3.0, False)], ids=str
+)
+def test_one_whose_velocity_cameras_contradict_in_flight_is_blind(seen_m_s, seconds, blind) -> None:
+    turns, asked = Turns(), (0.4, 0.0, 0.0)
+    turns(Action.FLY, TOLD, 2.0, velocity_m_s=asked, seen_m_s=(0.4, 0.0))
+    turns(Action.FLY, TOLD, seconds, velocity_m_s=asked, seen_m_s=(seen_m_s, 0.0))
+    assert turns.control.blind is blind
+    assert bool(turns.control.doubted) is blind
+
+
+def test_a_fast_one_may_be_wrong_by_its_scale(turns) -> None:
+    fast = SOUND._replace(velocity_m_s=(1.25, 0.0, 0.0))
+    turns(Action.FLY, fast, 4.0, velocity_m_s=(1.25, 0.0, 0.0), seen_m_s=(1.0, 0.0))
+    assert not turns.control.blind
+
+
+def test_one_found_blind_while_it_brakes_is_not_pushed_backwards() -> None:
+    """Cameras tell a mean that is half a second old: commands since then have slowed it."""
+    loop, tilt, speed, flown = VelocityLoop(ArDroneLimits()), 0.0, 0.0, list[float]()
+    for turn in range(240):
+        if turn < 140:
+            wanted = 0.4 if turn < 120 else 0.0
+            asked = loop.step((wanted, 0.0, 0.0), 0.0, (speed if turn < 120 else 0.4, 0.0, 0.0), 0.025)
+        else:
+            asked = loop.brake(0.025)
+        if turn == 139:
+            loop.recover((sum(flown[-24:]) / 24, 0.0), 0.025)
+        tilt += (asked.pitch_rad - tilt) * 0.025 / 0.15
+        speed += (9.81 * tilt - 0.15 * speed) * 0.025
+        flown.append(speed)
+    assert min(flown) > -0.08 and abs(flown[-1]) < 0.08
 
 
 def test_one_whose_velocity_cameras_confirm_is_neither_doubted_nor_braked(turns) -> None:

@@ -63,3 +63,24 @@ def test_of_two_that_do_the_same_both_show() -> None:
 def test_two_that_cancel_out_do_not_show() -> None:
     against = fault("velocity_jumping", value=0.5, direction_deg=180.0)
     assert shown_s(fault("velocity_jumping", value=0.5), against) == [None, None]
+
+
+def over_a_floor(speed_m_s: float, report: float) -> float | None:
+    """Return when a uniform floor from 10 s on shows below a level drone at a constant speed."""
+    floor = fault("uniform_floor", value=report)
+    values = ObservedValues((floor,))
+    for n in range(round(14.0 / 0.005)):
+        honest = Readings(n, (speed_m_s, 0.0, 0.0), 0, 0, 0, (0, 0, 0), (0, 0, 9.8), 1.0)
+        values.report(n * 0.005, honest)
+    return values.observable_s(floor)
+
+
+def test_noise_about_zero_shows_at_once_where_no_drone_could_brake_so() -> None:
+    assert over_a_floor(0.35, 1.0) == pytest.approx(10.05, abs=0.05)
+    assert over_a_floor(0.15, 1.0) is None
+
+
+def test_an_integral_of_the_tilts_shows_in_means_beyond_what_healthy_floors_mislead_by() -> None:
+    # It leaks within 2 s: 0.3 m/s (1 - exp(-t / 2 s)) are missing, a quarter of a second later in the mean.
+    assert over_a_floor(0.3, 2.0) == pytest.approx(10.0 + 2.6 + 0.25, abs=0.2)
+    assert over_a_floor(0.2, 2.0) is None

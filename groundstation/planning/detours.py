@@ -70,14 +70,18 @@ class Detours:
         """
         if self.obstacles:
             doubt_m = _STEP_M * math.ceil(self.sigmas * std_m / _STEP_M)
-            wide_m = max(self.keep_m, self.least_m + _BESIDE_M + doubt_m)
+            keep_m = self.least_m + doubt_m
+            wide_m = max(self.keep_m, keep_m + _BESIDE_M)
             fence = self.fence.shrunk(self.margin_m + doubt_m + _NARROWLY_M)
             wide = _way(place, goal, self._outlines(height_m, wide_m), wide_m, _BESIDE_M, fence)
-            if wide is not None and wide.is_straight:
+            # Between an obstacle and the fence only a narrow way may end near the goal.
+            farther_m = self._short_m(goal, height_m, wide_m, fence) - self._short_m(goal, height_m, keep_m, fence)
+            ends_near = not farther_m > wide_m - keep_m + _TOUCH_M
+            if wide is not None and wide.is_straight and ends_near:
                 return wide
-            keep_m = self.least_m + doubt_m
             narrow = _way(place, goal, self._outlines(height_m, keep_m), keep_m, _NARROWLY_M, fence)
-            if wide is not None and (narrow is None or narrow.length_m > (1.0 - _SHORTER) * wide.length_m):
+            shorter = narrow is not None and wide is not None and narrow.length_m <= (1.0 - _SHORTER) * wide.length_m
+            if wide is not None and (narrow is None or (ends_near and not shorter)):
                 return wide
             if narrow is not None:
                 return narrow
@@ -96,6 +100,12 @@ class Detours:
             x, y = places[:, 0], places[:, 1]
             clear &= (x <= x0) | (x >= x1) | (y <= y0) | (y >= y1)
         return clear
+
+    def _short_m(self, goal: Vector2, height_m: float, keep_m: float, fence: Rectangle) -> float:
+        """Return how far from the goal a way that keeps a distance ends [m]; infinite if it ends nowhere."""
+        around = [outline.grown(keep_m) for outline in self._outlines(height_m, keep_m)]
+        end = _cleared(goal, around, fence)
+        return math.inf if end is None else math.dist(end, goal)
 
     def _outlines(self, height_m: float, keep_m: float) -> tuple[Rectangle, ...]:
         return tuple(box.outline for box in self.obstacles if height_m < box.size_m[2] + keep_m)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from groundstation.control.flight_mode import FlightMode
@@ -80,8 +80,15 @@ def test_a_goal_in_one_obstacle_does_not_hide_the_others() -> None:
     assert detours.extra_m((0.0, 2.35), (0.0, 0.0), HEIGHT_M) > 2.0
 
 
+def test_a_goal_between_an_obstacle_and_the_fence_is_not_given_up_for_one_with_more_room_beside_it() -> None:
+    board, goal = Box((2.5, 1.44), (1.12, 0.22, 3.0)), (2.18, 2.223)
+    end, least_m = flown((board,), (1.0, 1.2), goal, 0.077, (0.05, -0.005))
+    assert math.dist(end, goal) < 0.45 and least_m > 0.45
+
+
 @given(st.integers(0, 1 << 20))
 @settings(max_examples=12, deadline=None)
+@example(9)
 def test_random_rooms_are_crossed(seed: int) -> None:
     rng = np.random.default_rng(seed)
     boxes = tuple(

@@ -25,7 +25,8 @@ class MotionReport(NamedTuple):
     fresh: telemetry arrived a moment ago; told: fresh, with new contents; repeats: its velocity is no measurement;
     able: fresh, it flies, and its reports besides the velocity are sound; blind: able, and its optical flow fails;
     flowless: blind, and not because of a velocity stuck in motion; velocity_m_s: true (scaled), FLU; force_m_s2:
-    specific force forward and left, None if not reported; height_m: above the floor, likewise.
+    specific force forward and left, None if not reported; height_m: above the floor, likewise; obeys: False while it is
+    known that no command arrives.
     """
 
     fresh: bool
@@ -37,6 +38,7 @@ class MotionReport(NamedTuple):
     velocity_m_s: Vector3
     force_m_s2: tuple[float, float] | None
     height_m: float | None
+    obeys: bool = True
 
 
 class AttitudeControl:
@@ -104,7 +106,9 @@ class AttitudeControl:
 
     def _guided(self, now_ns: int, decision: WatchdogDecision, report: MotionReport, dt_s: float) -> AttitudeRequest:
         """Return the attitude of a drone that follows its setpoint, or holds its place by itself."""
-        holds = decision.action is Action.HOVER
+        # Commands that do not arrive cause no speed, and the first one that does is to stop what the last one did.
+        deaf = decision.action is Action.FLY and not report.obeys
+        holds = deaf or decision.action is Action.HOVER
         back = decision.back_m_s if holds else None
         if holds and report.fresh and back is None:
             return self._loop.hold(report.velocity_m_s, dt_s)
@@ -120,5 +124,6 @@ class AttitudeControl:
         asked = self._loop.step(wanted, decision.yaw_rate_rad_s, measured, dt_s, force, seen)
         if not self._loop.contradicted:
             return asked
-        self._doubt.contradict(report.velocity_m_s)
+        if self._doubt.contradict(now_ns, report.velocity_m_s) and seen is not None:
+            self._loop.recover(seen, dt_s)
         return HOVER

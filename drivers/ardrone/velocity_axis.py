@@ -81,7 +81,8 @@ class Axis:
         self._lately = deque([self.speed_m_s], self._gains.seen_ticks)
         self._unseen = self._push_m_s2 = 0.0
         self.flown_m_s = self.speed_m_s
-        self._flown_lately = deque([self.flown_m_s], self._gains.seen_ticks)
+        # By commands and accelerometers alone, but for a constant: the measured speed may be wrong.
+        self._unmeasured = deque([self.speed_m_s], self._gains.seen_ticks)
         self._expected_m_s = self.flown_m_s
         self._unexplained_m = 0.0
 
@@ -123,10 +124,10 @@ class Axis:
         self._unseen = 0.0
 
     def recover(self, seen_m_s: float) -> None:
-        """Forget the measured speeds: take the mean one that cameras saw over the last calls, and commands since."""
-        off_m_s = seen_m_s - sum(self._flown_lately) / len(self._flown_lately)
-        self.speed_m_s = self.flown_m_s + off_m_s
-        self._lately = deque((speed + off_m_s for speed in self._flown_lately), self._gains.seen_ticks)
+        """Forget the measured speeds: take the mean one that cameras saw over the last calls, and its change since."""
+        self.speed_m_s = self._unmeasured[-1]
+        self._lately = deque(self._unmeasured, self._gains.seen_ticks)
+        self._shift(seen_m_s - sum(self._lately) / len(self._lately))
         self._unseen = self._unexplained_m = 0.0
 
     def _shift(self, correction_m_s: float) -> None:
@@ -153,6 +154,8 @@ class Axis:
         outside = air + self.bias_m_s2
         self._wind_m_s2 = 0.0 if blind or self.contradicted else self._wind(air)
         acceleration = self._answer(dt_s) + outside + turn_m_s2
+        unmeasured = acceleration - self.bias_m_s2 + self._lasting_m_s2
+        self._unmeasured.append(self._unmeasured[-1] + unmeasured * dt_s)
         self.speed_m_s += acceleration * dt_s
         self._lately.append(self.speed_m_s)
         if measured_m_s is None:
@@ -234,7 +237,6 @@ class Axis:
         least = (slowest - self.flown_m_s) * gains.reference_rad_s - slower
         asked = min(max(acceleration_m_s2, least), most)
         self.flown_m_s += (asked + slower) * dt_s
-        self._flown_lately.append(self.flown_m_s)
         return asked
 
     def ask(self, acceleration_m_s2: float) -> None:

@@ -55,10 +55,12 @@ class VelocityDoubt:
         """Return why the velocity is doubted, or ""."""
         return NO_FLOOR if self.blind else CONTRADICTS if self._contradicts else ""
 
-    def contradict(self, told_m_s: Vector3) -> None:
-        """Note that the reported velocity contradicts the commands."""
+    def contradict(self, now_ns: int, told_m_s: Vector3) -> bool:
+        """Note that the reported velocity contradicts the commands; return whether cameras contradict it as well."""
         self._contradicts = True
-        self.blind = self.blind or math.hypot(*told_m_s[:2]) < NO_MOTION_M_S
+        strays = now_ns - self._since_ns.get("strays", now_ns) >= _BOTH_NS
+        self.blind = self.blind or strays or math.hypot(*told_m_s[:2]) < NO_MOTION_M_S
+        return strays
 
     def step(
         self,
@@ -88,13 +90,19 @@ class VelocityDoubt:
         claimed, speed, apart = math.hypot(*told), math.hypot(*seen_m_s), math.dist(told, seen_m_s)
         moves = claimed < NO_MOTION_M_S and speed > claimed + _SEEN_M_S
         drifts = stands_ns > _BRAKES_WITHIN_NS and speed > _ADRIFT_M_S and apart > _APART_M_S
-        strays = action is Action.FLY and apart > max(_APART_M_S, _SCALE * speed)
+        # Its own hover may brake it faster than cameras can follow: then only what began before it counts.
+        flies = action is Action.FLY or (self._contradicts and "strays" in self._since_ns)
+        strays = flies and apart > max(_APART_M_S, _SCALE * speed)
         stood = speed < _CONFIRMED_M_S and apart < _CONFIRMED_M_S
         if self._lasting(now_ns, "stood", stood) >= _CONFIRMED_NS:
             self._contradicts = False
         both = moves and commanded_m_s > claimed + _COMMANDED_M_S
-        seen = (("moves", moves), ("drifts", drifts), ("strays", strays))
-        lasting = (*((what, holds, _SEEN_NS) for what, holds in seen), ("both", both, _BOTH_NS))
+        seen, strays_ns = (("moves", moves), ("drifts", drifts)), _BOTH_NS if self._contradicts else _SEEN_NS
+        lasting = (
+            *((what, it, _SEEN_NS) for what, it in seen),
+            ("strays", strays, strays_ns),
+            ("both", both, _BOTH_NS),
+        )
         for_ns = [self._lasting(now_ns, what, holds) - enough_ns for what, holds, enough_ns in lasting]
         shown = max(for_ns) >= 0
         fresh, self.blind = shown and not self.blind, self.blind or shown

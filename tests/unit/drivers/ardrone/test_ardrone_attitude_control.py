@@ -105,6 +105,13 @@ def test_one_that_reports_to_stand_though_sent_on_is_blind_and_braked_and_sinks(
     assert turns.control.sinks
 
 
+def test_one_that_hears_no_command_is_not_doubted_for_not_obeying_and_is_to_hold_its_place(turns) -> None:
+    deaf = STILL._replace(obeys=False)
+    assert turns(Action.FLY, deaf, 3.0, velocity_m_s=(0.4, 0.0, 0.0)).hover
+    turns(Action.FLY, STILL, 0.2, velocity_m_s=(0.4, 0.0, 0.0))
+    assert not turns.control.doubted and not turns.control.blind
+
+
 def test_one_that_cameras_see_move_though_it_reports_to_stand_is_blind_and_braked(turns) -> None:
     asked = turns(Action.HOVER, STILL, 2.0, seen_m_s=(0.3, 0.0))
     assert turns.control.blind and not asked.hover and asked.pitch_rad < 0.0
@@ -139,6 +146,18 @@ def test_one_whose_velocity_cameras_contradict_in_flight_is_blind(seen_m_s, seco
     turns(Action.FLY, TOLD, seconds, velocity_m_s=asked, seen_m_s=(seen_m_s, 0.0))
     assert turns.control.blind is blind
     assert bool(turns.control.doubted) is blind
+
+
+def test_cameras_need_less_time_where_commands_contradict_the_velocity_too() -> None:
+    turns, asked = Turns(), (0.4, 0.0, 0.0)
+    turns(Action.FLY, TOLD, 2.0, velocity_m_s=asked, seen_m_s=(0.4, 0.0))
+    left_m_s = 0.0
+    while not turns.control.doubted:
+        left_m_s += 0.01
+        wrong = SOUND._replace(velocity_m_s=(0.4, left_m_s, 0.0))
+        turns(Action.FLY, wrong, 0.025, velocity_m_s=asked, seen_m_s=(0.4, 0.0))
+    turns(Action.HOVER, wrong, 0.45, seen_m_s=(0.4, 0.0))
+    assert turns.control.blind
 
 
 def test_a_fast_one_may_be_wrong_by_its_scale(turns) -> None:

@@ -258,6 +258,7 @@ class ArDrone:
             velocity_m_s=self._true(velocity),
             force_m_s2=force,
             height_m=heard.height_m,
+            obeys=not self._uplink.cut,
         )
 
     def _is_able(self) -> bool:

@@ -17,7 +17,7 @@ from sim_bridge.wrong_values import WrongValues
 
 _EVERY_TICKS = 2  # 100 Hz: twice as often as odometry is published
 # The options that the driver reads; the others of a full packet would take half of a flight's computing time.
-_SENT = frozenset({0, 1, 3, 10, 16, 21})
+_SENT = frozenset({0, 1, 3, 6, 10, 16, 21})
 _LARGEST = 2048
 
 

@@ -8,6 +8,7 @@ from drivers.datagrams import DatagramLog
 from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
 from drivers.mavlink.convert import LIMITS
+from drivers.mavlink.heading_watch import HeadingWatch
 from drivers.mavlink.latest_telemetry import LatestTelemetry
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.motors import FELL
@@ -25,12 +26,12 @@ from drivers.mavlink.vision import FIRST_SIGHT_NS, VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, MavSeverity, SensorBits
-from drivers.plausibility.health import Health
+from drivers.plausibility.health import Finding, Health, HealthReport, Sensor
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import Estimate, Vector3
+from groundstation.bus.messages import EntityEstimate, Estimate, Vector3
 from groundstation.time_units import NEVER_NS, NS_PER_S
 
 _ASKS_NS = 3 * NS_PER_S
@@ -68,7 +69,7 @@ class MavlinkVehicle:
         self.misfit, self._namesakes = identity.Misfit(self.flavour, self.system), identity.Namesakes(self.system)
         self._flight = ReportedFlight(self.flavour, self.orders, self.misfit)
         self._traffic = Traffic()
-        self._plausibility = MotionMonitor(LIMITS)
+        self._plausibility, self._heading = MotionMonitor(LIMITS), HeadingWatch()
         self._refused: Counter[str] = Counter()
         self._said, self._boot_clock = Texts(), BootClock()
         self._readiness = Readiness(self.flavour, self._session, self._requests, self._said)
@@ -127,6 +128,8 @@ class MavlinkVehicle:
         # As received: an attitude extrapolated by its age no longer shows that it is stuck.
         sample = convert.sample_from_local(now_ns, message, known.attitude, known.inertial)
         report = self._plausibility.update(sample, self._flight.state(now_ns, known))
+        if why := self._heading.reason:  # what its velocity was turned by
+            report = HealthReport((Finding(Sensor.VELOCITY, Health.BAD, why), *report.findings), report.withheld)
         self._publisher.velocity(now_ns, velocity, attitude, report)
         return replace(known, moved_ns=now_ns, velocity_m_s=velocity, position_m=position)
 
@@ -174,17 +177,25 @@ class MavlinkVehicle:
         good, known = self.vision.take(now_ns, estimate), self.telemetry
         if self.orders.starting and not self.orders.lift.lifted and known.base_mode & ARMED:
             self._publisher.stated.leave_floor(now_ns)
-        reported = known.velocity_m_s if known.tells_motion(now_ns) else None
+        self._compare_heading(now_ns, good, known)
+        reported = known.velocity_m_s if known.tells_motion(now_ns) and not self._heading.reason else None
         if good is not None and self.orders.see(now_ns, good, reported):
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
         if (seen := self.vision.sighted) is not None and self.orders.lift.lifted:
             self.orders.drift.see_place(now_ns, seen.position_m, seen.yaw_rad)
+
+    def _compare_heading(self, now_ns: int, good: EntityEstimate | None, known: LatestTelemetry) -> None:
+        if not self.orders.lift.lifted:
+            self._heading.reset()
+        elif good is not None and (attitude := known.attitude_at(now_ns)) is not None:
+            self._heading.take(now_ns, good, attitude.yaw_rad)
 
     def view(self, now_ns: int) -> VehicleView:
         """Return the vehicle's last reported state."""
         known = self.telemetry
         wrong = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
         unsound, mute = self._flight.unsound(now_ns, known, wrong, self._session.slow)
+        unsound = unsound or self._heading.reason
         heeded = self.orders.are_heeded(now_ns, known.custom_mode)
         piloted = self._flight.is_piloted(now_ns, known)
         limited = heeded or self._flight.must_keep_limits(now_ns)

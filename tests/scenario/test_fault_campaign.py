@@ -106,3 +106,30 @@ def test_a_team_without_a_ceiling_camera_is_placed_by_what_its_field_has(name: s
     told = flight.fly()
     assert told["found_s"] is not None and told["rmse_m"] < 0.3, told
     assert flight.judge.lost_s < 1.0
+
+
+@pytest.mark.slow
+def test_a_vehicle_whose_heading_is_off_is_stopped_before_its_velocity_swings_up() -> None:
+    """Seed 610026 of `mixed-team`: 1.08 m/s, 13 s after the jump."""
+    turned = fly("mixed-team", Fault(kind=FaultKind.HEADING_JUMPING, entity="drone_3", start_s=18.7, value=68.0))
+    assert turned["unsafe"] == {}
+    assert "heading is off by" in turned["reasons"]["drone_3"]
+
+
+@pytest.mark.slow
+def test_a_drone_that_hears_again_in_wind_is_not_carried_off() -> None:
+    """Seed 610038 of `mixed-team`: 1.45 m/s, braked from a speed that it never had."""
+    wind = Fault(kind=FaultKind.WIND, entity="drone_1", start_s=10.0, value=1.6)
+    deaf = Fault(kind=FaultKind.AT_DEAF, entity="drone_1", start_s=12.0, end_s=14.0)
+    flown = fly("lab", wind, deaf, seconds=12.0)
+    assert flown["unsafe"] == {} and flown["speed_m_s"] < 0.8
+    assert "does not see the floor" not in flown["reasons"]["drone_1"]
+
+
+@pytest.mark.parametrize("value", [1.0, 2.0])
+def test_a_drone_without_a_floor_does_not_track_on_by_what_it_reports_instead(value: float) -> None:
+    """Noise about zero, and the integral of the tilts, by which drones tracked on for up to 9 s."""
+    floor = Fault(kind=FaultKind.UNIFORM_FLOOR, entity="drone_2", start_s=9.5, value=value)
+    flown = fly("lab", floor, seconds=9.0, seed=8)
+    assert flown["unsafe"] == {}
+    assert "sensors cannot be believed" in flown["reasons"]["drone_2"], flown

@@ -81,7 +81,7 @@ class Axis:
         self._lately = deque([self.speed_m_s], self._gains.seen_ticks)
         self._unseen = self._push_m_s2 = 0.0
         self.flown_m_s = self.speed_m_s
-        # By commands and accelerometers alone, but for a constant: the measured speed may be wrong.
+        # By commands and accelerometers, drawn to the observer within `lasting_s`: the measured speed may be wrong.
         self._unmeasured = deque([self.speed_m_s], self._gains.seen_ticks)
         self._expected_m_s = self.flown_m_s
         self._unexplained_m = 0.0
@@ -124,10 +124,13 @@ class Axis:
         self._unseen = 0.0
 
     def recover(self, seen_m_s: float) -> None:
-        """Forget the measured speeds: take the mean one that cameras saw over the last calls, and its change since."""
+        """Forget the measured speeds: take that by commands and accelerometers, half corrected by cameras.
+
+        They saw a mean over the last calls, of places that the tracker carried on by the wrong speed.
+        """
         self.speed_m_s = self._unmeasured[-1]
         self._lately = deque(self._unmeasured, self._gains.seen_ticks)
-        self._shift(seen_m_s - sum(self._lately) / len(self._lately))
+        self._shift(self._gains.first_seen * (seen_m_s - sum(self._lately) / len(self._lately)))
         self._unseen = self._unexplained_m = 0.0
 
     def _shift(self, correction_m_s: float) -> None:
@@ -154,8 +157,9 @@ class Axis:
         outside = air + self.bias_m_s2
         self._wind_m_s2 = 0.0 if blind or self.contradicted else self._wind(air)
         acceleration = self._answer(dt_s) + outside + turn_m_s2
-        unmeasured = acceleration - self.bias_m_s2 + self._lasting_m_s2
-        self._unmeasured.append(self._unmeasured[-1] + unmeasured * dt_s)
+        unmeasured_m_s = self._unmeasured[-1] + (acceleration - self.bias_m_s2 + self._lasting_m_s2) * dt_s
+        off_m_s = self.speed_m_s - self._unmeasured[-1]
+        self._unmeasured.append(unmeasured_m_s + off_m_s * min(1.0, dt_s / gains.lasting_s))
         self.speed_m_s += acceleration * dt_s
         self._lately.append(self.speed_m_s)
         if measured_m_s is None:

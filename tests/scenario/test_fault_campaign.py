@@ -126,10 +126,8 @@ def test_a_drone_that_hears_again_in_wind_is_not_carried_off() -> None:
     assert "does not see the floor" not in flown["reasons"]["drone_1"]
 
 
-@pytest.mark.parametrize("value", [1.0, 2.0])
-def test_a_drone_without_a_floor_does_not_track_on_by_what_it_reports_instead(value: float) -> None:
-    """Noise about zero, and the integral of the tilts, by which drones tracked on for up to 9 s."""
-    floor = Fault(kind=FaultKind.UNIFORM_FLOOR, entity="drone_2", start_s=9.5, value=value)
+def test_a_drone_without_a_floor_does_not_track_on_by_the_integral_of_its_tilts() -> None:
+    floor = Fault(kind=FaultKind.UNIFORM_FLOOR, entity="drone_2", start_s=9.5, value=2.0)
     flown = fly("lab", floor, seconds=9.0, seed=8)
     assert flown["unsafe"] == {}
     assert "sensors cannot be believed" in flown["reasons"]["drone_2"], flown

@@ -86,7 +86,8 @@ class AttitudeControl:
         """Return the report with what commands and cameras have shown of the drone's optical flow."""
         told, seen = report.velocity_m_s if report.told and not report.repeats else None, decision.seen_m_s
         commanded_m_s = self._loop.commanded_m_s
-        if self._doubt.step(now_ns, decision.action, told, seen, commanded_m_s) and seen is not None:
+        flown = decision.action is Action.FLY or decision.back_m_s is not None
+        if self._doubt.step(now_ns, decision.action, told, seen, commanded_m_s, flown) and seen is not None:
             self._loop.recover(seen, dt_s)  # its own velocity gives no speed from which to brake it
         if not (self._doubt.blind and report.able):
             return report

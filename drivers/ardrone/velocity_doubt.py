@@ -69,11 +69,13 @@ class VelocityDoubt:
         told_m_s: Vector3 | None,
         seen_m_s: tuple[float, float] | None,
         commanded_m_s: float = 0.0,
+        flown: bool = False,
     ) -> bool:
         """Take one turn; return whether cameras have just shown that the drone sees no floor.
 
         told_m_s: its velocity, None if it reports nothing new; seen_m_s: likewise by cameras, forward and left, None
-        if they do not see it; commanded_m_s: the speed that its commands should show by now, 0 if unknown.
+        if they do not see it; commanded_m_s: the speed that its commands should show by now, 0 if unknown; flown: it
+        follows a velocity, also back to the place of its hover.
         """
         if action in _STANDS:
             self.reset()
@@ -91,7 +93,7 @@ class VelocityDoubt:
         moves = claimed < NO_MOTION_M_S and speed > claimed + _SEEN_M_S
         drifts = stands_ns > _BRAKES_WITHIN_NS and speed > _ADRIFT_M_S and apart > _APART_M_S
         # Its own hover may brake it faster than cameras can follow: then only what began before it counts.
-        flies = action is Action.FLY or (self._contradicts and "strays" in self._since_ns)
+        flies = flown or (self._contradicts and "strays" in self._since_ns)
         strays = flies and apart > max(_APART_M_S, _SCALE * speed)
         stood = speed < _CONFIRMED_M_S and apart < _CONFIRMED_M_S
         if self._lasting(now_ns, "stood", stood) >= _CONFIRMED_NS:

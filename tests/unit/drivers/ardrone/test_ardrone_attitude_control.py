@@ -160,6 +160,12 @@ def test_cameras_need_less_time_where_commands_contradict_the_velocity_too() -> 
     assert turns.control.blind
 
 
+def test_one_that_is_flown_back_to_its_place_is_judged_like_one_that_tracks(turns) -> None:
+    """Seed 750009 of the lab field: 0.6 m/s on the way back, by an integral of the tilts."""
+    turns(Action.HOVER, TOLD, 1.0, seen_m_s=(0.15, 0.0), back_m_s=(0.3, 0.0, 0.0))
+    assert turns.control.blind
+
+
 def test_a_fast_one_may_be_wrong_by_its_scale(turns) -> None:
     fast = SOUND._replace(velocity_m_s=(1.25, 0.0, 0.0))
     turns(Action.FLY, fast, 4.0, velocity_m_s=(1.25, 0.0, 0.0), seen_m_s=(1.0, 0.0))

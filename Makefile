@@ -14,14 +14,15 @@ PYTEST = $(BIN)/python -m pytest $(REPEAT)
 jobs = --jobs $(if $(REPEAT),1,$(1)) --keep-going --output-sync=none
 
 INTEROP := .interop
-PARTS := waiting units others
+PARTS := waiting-1 waiting-2 units others
 COVERAGE := $(PARTS:%=.pytest_cache/coverage-%.json)
-# Fast tests that wait for sockets, processes or time; all others compute. Each file has loopback addresses of its own.
-WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver tests/contract/mavlink_links \
-	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
-	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py tests/unit/drivers/tello/test_tello_video.py
+# Fast tests that wait for sockets, processes or time, in two halves side by side; all others compute, and take what
+# they leave. Each file has loopback addresses of its own.
+WAITING_1 := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver tests/replay/test_replay_playback.py tests/sitl
+WAITING_2 := tests/contract/mavlink_links tests/unit/console tests/unit/supervisor tests/unit/cli/test_cli_stop.py \
+	tests/unit/cli/test_cli_bench_report.py tests/unit/drivers/tello/test_tello_video.py
 
-.PHONY: help install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages-1 slow-pages-2 slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: help install demo test test-waiting-1 test-waiting-2 test-units test-others raise-floors test-slow slow-flights slow-pages-1 slow-pages-2 slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)  ## the product, in .venv, with compiled kernels (also: make alone)
 
@@ -31,24 +32,27 @@ help:  ## this list
 demo: $(STAMP)  ## one flight in the simulator; DEMO_ARGS=...
 	$(BIN)/groundstation demo $(DEMO_ARGS)
 
-# Tests that wait (for sockets, processes, time) run in one pytest, those that compute beside them in two others, printed
-# at their ends. What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors
-# raises them.
+# Tests that wait (for sockets, processes, time) run in two halves, the first printed as it runs, those that compute
+# beside them in two parts of lower priority. What runs is measured, and each package has a floor
+# (tests/coverage/floors.toml); make raise-floors raises them.
 test: $(STAMP)-test  ## the fast tests
-	$(MAKE) $(call jobs,3) $(PARTS:%=test-%)
+	$(MAKE) $(call jobs,4) $(PARTS:%=test-%)
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE)
 
-test-waiting: $(STAMP)-test
-	COVERAGE_DATA=.pytest_cache/coverage-waiting.json $(PYTEST) -m "not slow" $(WAITING)
+test-waiting-1: $(STAMP)-test
+	COVERAGE_DATA=.pytest_cache/coverage-waiting-1.json $(PYTEST) -m "not slow" $(WAITING_1)
 
 # Kernels that only the planar planner has take a minute to compile: one of the parts waits for them.
 PLANAR := $(wildcard tests/*/test_planar_*.py)
-test-units: COMPUTED = tests/unit $(PLANAR)
-test-others: COMPUTED = --ignore=tests/unit $(PLANAR:%=--ignore=%) tests
-test-units test-others: test-%: $(STAMP)-test
+COMPUTED := $(addprefix --ignore=,$(WAITING_1) $(WAITING_2))
+test-waiting-2: FAST = $(WAITING_2)
+test-units: FAST = $(COMPUTED) tests/unit $(PLANAR)
+test-others: FAST = $(COMPUTED) --ignore=tests/unit $(PLANAR:%=--ignore=%) tests
+test-units test-others: BESIDE = .ci/background
+test-waiting-2 test-units test-others: test-%: $(STAMP)-test
 	@mkdir -p .pytest_cache/$* && code=0; \
-	COVERAGE_DATA=.pytest_cache/coverage-$*.json .ci/background $(PYTEST) -m "not slow" -o cache_dir=.pytest_cache/$* \
-		$(addprefix --ignore=,$(WAITING)) $(COMPUTED) >.pytest_cache/$*/log 2>&1 || code=$$?; \
+	COVERAGE_DATA=.pytest_cache/coverage-$*.json $(BESIDE) $(PYTEST) -m "not slow" -o cache_dir=.pytest_cache/$* $(FAST) \
+		>.pytest_cache/$*/log 2>&1 || code=$$?; \
 	cat .pytest_cache/$*/log; exit $$code
 
 raise-floors: $(STAMP)-test  ## set the coverage floors to the last run's figures

@@ -12,7 +12,7 @@ from sim_bridge.wrong_values import WRONG_VALUES, WrongValues
 _VELOCITY_M_S, _HEIGHT_M, _HEADING_RAD, _CHARGE = 0.15, 0.15, math.radians(8.0), 0.1
 # Repeated contents are observable at once: noise never repeats.
 _AT_ONCE = frozenset({FaultKind.TELEMETRY_FROZEN})
-# Reports over a uniform floor vary (decision 0370). Healthy floors mislead by 0.1 m/s (scenario `flow-bias`), and
+# Reports over a uniform floor vary (decision 0368). Healthy floors mislead by 0.1 m/s (scenario `flow-bias`), and
 # cameras know the mean velocity of half a second to 0.12 m/s (three deviations).
 _MISLED_M_S, _MISLED_S = 0.22, 0.5
 # A report that changes by more within 0.1 s than the greatest tilt brakes (2.1 m/s^2) shows at once, without its noise.

@@ -47,10 +47,11 @@ SILENT_TOO = {
 
 # Frozen, and braked by its own firmware: cameras still observed the speed of half a second before.
 BRAKED_BY_ITSELF = (120292, ["telemetry_frozen"])
-# Autopilots with distrusted telemetry, in view of a fixed camera: without further position updates they drifted.
+# Autopilots with distrusted telemetry, in view of a fixed camera: without further position updates they drifted. With
+# the kinds that are drawn, or [] for any.
 NOT_BELIEVED = {
-    "frozen": (140014, ["battery_drop", "telemetry_frozen"]),
-    "at_a_place_that_pictures_show": (141040, ["telemetry_frozen"]),
+    "frozen": (150006, ["telemetry_frozen"], ["telemetry_frozen"]),
+    "at_a_place_that_pictures_show": (141040, ["telemetry_frozen"], []),
 }
 
 # The ceiling camera saw the velocity drift off, and lost the drone; the other drone was without floor in view.
@@ -92,15 +93,17 @@ def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
     return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}
 
 
-# Not mended. Which seeds are unsafe changes with every moment of the take-off; they are of these kinds. One loses its
-# floor and freezes half a second later: it drifts at 0.1 m/s in the ceiling's view and is at rest only when it has
-# landed, after 6.8 s, as with 2 of 5 other seeds. An autopilot whose velocity sticks as it turns rests after 4.9 s.
+# Not mended. Which seeds are unsafe changes with every moment of the take-off; they are of these kinds. One freezes and
+# loses its floor 0.4 s later: it is at rest after 4.5 s (one of 4 seeds with both on one drone). A PX4 that freezes
+# hovers by its own wrong velocity, at up to 0.12 m/s for a moment: at rest after 4.3 s (one of 13). An autopilot whose
+# velocity sticks as it turns rests after 4.9 s.
 # The velocity of the third drifts at the border of the view, and its setpoints lead 0.5 m off its believed place for
 # 1.6 s. The last is stopped without a floor in view; then it hears nothing, keeps the tilt of its last command
 # and flies 1.4 m, at up to 0.4 m/s, until its own firmware has landed it.
 _FROZEN_TOO = ["uniform_floor", "telemetry_frozen"]
 UNSAFE = {
-    "frozen_after_it_is_blind": (48132, {"rest"}, [], "lab", _FROZEN_TOO),
+    "blind_after_it_is_frozen": (48143, {"rest"}, [], "lab", _FROZEN_TOO),
+    "frozen_autopilot": (140014, {"rest"}, [], "mixed-team", []),
     "turning_as_its_velocity_sticks": (140017, {"rest"}, [], "mixed-team", []),
     "drifting_in_the_corner_of_the_view": (7115, {"unlocalised"}, ["cameras.fps=15"], "lab", []),
     "blind_and_then_deaf": (23, {"resumed"}, ["cameras.fps=15"], "lab", []),
@@ -177,9 +180,9 @@ def test_a_frozen_drone_that_its_firmware_brakes_is_not_braked_for_what_cameras_
 
 @pytest.mark.slow
 @pytest.mark.study
-@pytest.mark.parametrize(("seed", "kinds"), NOT_BELIEVED.values(), ids=NOT_BELIEVED)
-def test_an_autopilot_that_is_not_believed_holds_its_place(seed: int, kinds: list[str]) -> None:
-    assert safely_flown(order_of([], "mixed-team"), seed, kinds)["rest_s"] <= 3.2
+@pytest.mark.parametrize(("seed", "kinds", "drawn"), NOT_BELIEVED.values(), ids=NOT_BELIEVED)
+def test_an_autopilot_that_is_not_believed_holds_its_place(seed: int, kinds: list[str], drawn: list[str]) -> None:
+    assert safely_flown(order_of([], "mixed-team") | {"kinds": drawn}, seed, kinds)["rest_s"] <= 3.2
 
 
 @pytest.mark.slow

@@ -78,10 +78,13 @@ def face(
     yaw = entity.start + entity.at_yaw
     for i in range(innovation.prediction.size):
         by_subject = innovation.prediction.H_subject[i, subject.at_yaw] if subject.at_yaw >= 0 else 0.0
-        if sensor.is_angle[i] == 0 or by_subject != 0.0:
+        by_own = innovation.prediction.H_observer[
+            i, entity.at_yaw
+        ]  # -1 for a bearing: it sinks when the robot turns left
+        if sensor.is_angle[i] == 0 or by_subject != 0.0 or by_own == 0.0:
             continue
         if insists or variance_of(belief.P, deferred, yaw) > _UNKNOWN_RAD2:
-            belief.mean[yaw] = wrap(belief.mean[yaw] + innovation.y[i])
+            belief.mean[yaw] = wrap(belief.mean[yaw] + innovation.y[i] / by_own)
             turned = True
     return turned
 

@@ -1,6 +1,7 @@
 """Robots that read landmarks and each other while one robot's commands, or many readings, are wrong."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,25 +24,31 @@ COURSES = {"a": (-2.0, 0.0, 0.0, 0.2, 0.15), "b": (1.5, -1.0, 1.0, 0.25, -0.2), 
 
 @dataclass
 class Faults:
-    """deaf: its commands are reported as zero; misread: share of readings that name another marker."""
+    """deaf: its commands are reported as zero; misread: share of readings that name another marker.
+
+    c_off: by how much robot c is placed wrong, in x, y and heading.
+    """
 
     deaf: str = ""
     misread: float = 0.0
+    c_off: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Team:
     """Three robots on circles among ten posts; nothing but the filter is told of commands and readings."""
 
-    def __init__(self, faults: Faults, seed: int) -> None:
+    def __init__(self, faults: Faults, seed: int, landmarks: Mapping[str, tuple[float, float]] = LANDMARKS) -> None:
         eyes = {name: RangeBearingSensor(name, is_depth=True) for name in COURSES}
-        posts = {name: Landmark((*place, 0.0)) for name, place in LANDMARKS.items()}
+        posts = {name: Landmark((*place, 0.0)) for name, place in landmarks.items()}
         # The posts come last: a block beyond theirs would lie beyond the state.
         robots = {name: CommandedRobot(turn_drag_m=0.0, response_s=0.0, lag_s=0.01) for name in COURSES}
         self.filter = FixedLagFilter(EstimatorParameters({**robots, **posts}, eyes, step_s=0.02, max_lateness_s=0.1))
         self.poses = {name: np.array(course[:3]) for name, course in COURSES.items()}
         self.now, self._faults, self._rng = START, faults, np.random.default_rng(seed)
+        self._landmarks = landmarks
         for name, (x, y, yaw, _, _) in COURSES.items():
-            self.filter.place(name, (x, y, 0.0, yaw), (1e-4, 1e-4, 1e-6, 4e-4), START, START)
+            dx, dy, turned = faults.c_off if name == "c" else (0.0, 0.0, 0.0)
+            self.filter.place(name, (x + dx, y + dy, 0.0, yaw + turned), (1e-4, 1e-4, 1e-6, 4e-4), START, START)
 
     def drive(self, seconds: float) -> None:
         """Drive on; robots read what is before them."""
@@ -58,18 +65,25 @@ class Team:
             self.filter.advance(self.now)
 
     def _read(self) -> None:
-        markers = LANDMARKS | {name: (float(pose[0]), float(pose[1])) for name, pose in self.poses.items()}
-        for name, (x, y, yaw) in self.poses.items():
+        markers = {**self._landmarks, **{name: (float(pose[0]), float(pose[1])) for name, pose in self.poses.items()}}
+        for name in self.poses:
             for subject, place in markers.items():
-                way, bearing = (
-                    math.dist((x, y), place),
-                    math.remainder(math.atan2(place[1] - y, place[0] - x) - yaw, math.tau),
-                )
+                way, bearing = self._true(name, place)
                 if subject == name or way > REACH_M or abs(bearing) > VIEW_RAD:
                     continue
                 if self._rng.random() < self._faults.misread:
                     subject = str(self._rng.choice([other for other in markers if other != name]))
                 self.read(name, subject, way * math.cos(bearing), bearing)
+
+    def _true(self, observer: str, place: tuple[float, float]) -> tuple[float, float]:
+        x, y, yaw = self.poses[observer]
+        bearing = math.remainder(math.atan2(place[1] - y, place[0] - x) - yaw, math.tau)
+        return math.dist((x, y), place), bearing
+
+    def see(self, observer: str, post: str) -> None:
+        """Add the reading of a post, wherever it stands."""
+        way, bearing = self._true(observer, self._landmarks[post])
+        self.read(observer, post, way * math.cos(bearing), bearing)
 
     def read(self, observer: str, subject: str, depth: float, bearing: float) -> None:
         """Add a reading, with its noise."""
@@ -118,6 +132,18 @@ def test_a_robot_that_was_placed_wrong_finds_its_place_by_landmarks(ahead_m: flo
     team.filter.place("c", wrong, (1e-4, 1e-4, 1e-6, 4e-4), START, START)
     team.drive(20.0)
     assert max(team.errors_m().values()) <= 0.1
+
+
+def test_a_robot_that_faces_the_wrong_way_turns_towards_the_landmark_that_it_reads() -> None:
+    """Turned by the bearing's residual with the wrong sign, it was thrown off by metres."""
+    for turned in (-2.6, -1.5, 1.5, 2.6):
+        team = Team(Faults(c_off=(0.0, 0.0, turned)), 6)
+        for _ in range(12):
+            team.now += 10**8
+            team.see("c", "post_5")
+            team.filter.advance(team.now)
+        assert abs(math.remainder(team.state_of("c")[0][3] - team.poses["c"][2], math.tau)) <= 0.1
+        assert team.errors_m()["c"] <= 0.1
 
 
 def test_a_landmark_that_is_read_far_off_touches_no_state_but_its_readers() -> None:

@@ -90,8 +90,8 @@ def confront_place(state: State, tables: Tables, event: EventRow, hypothesis: Hy
 @kernel()
 def face_subject(
     state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis, insists: bool
-) -> None:  # fmt: skip
-    """Let an observer of unknown heading face what it reads, in all modes, and confront it anew."""
+) -> bool:  # fmt: skip
+    """Let an observer of unknown heading face what it reads, in all modes, and confront it anew; True if it turned."""
     turned, sensor = False, tables.sensors[event.sensor]
     for m in range(state.means.shape[0]):
         belief, innovation = belief_of(state, tables, m), hypothesis.innovations[m]
@@ -100,6 +100,7 @@ def face_subject(
     if turned:
         set_noise(hypothesis.innovations, hypothesis.R)
         confront(state, tables, event, rows, hypothesis)
+    return turned
 
 
 @kernel()
@@ -188,7 +189,8 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     if not fresh:
         if choose(state, tables, event, rows, unused_s, used, other):
             used, out.alternative_chosen = other, 1
-        face_subject(state, tables, event, rows, used, False)
+        believed = state.means.copy()
+        turned = face_subject(state, tables, event, rows, used, False)
         mode = likeliest(state.weights, used.innovations)
         if mode < 0:
             out.verdict = SINGULAR
@@ -203,6 +205,8 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
                 rows, excess = YAW, confront_place(state, tables, event, used)
                 write_outcome(out, used.innovations[mode])
             elif out.verdict != PENDING:
+                if turned:
+                    copy_matrix(believed, state.means)
                 return
             loosened = answers_for(first, event) != event.subject
             joins = out.verdict == PENDING and not loosened

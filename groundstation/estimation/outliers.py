@@ -139,10 +139,13 @@ def insists(streak: Streak, settings: Settings, at: float) -> bool:
 
 @kernel()
 def is_outlier(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector) -> bool:
-    """Return whether a contradiction puts the subject elsewhere than most of its row, and count it against them.
+    """Return whether a reading by bearing puts the subject elsewhere than the contradictions before it.
 
-    If they have no majority, the row begins anew with the next one.
+    It takes one from their count; at zero the next one begins a new row. Boards that give a pose carry checked codes:
+    their sightings may be seldom, noisy or by cameras that differ, but are hardly ever of somebody else.
     """
+    if sensor.is_angle[X] == 0 and sensor.is_angle[Y] == 0:
+        return False
     memory, start, pose = belief.memory[event.subject], belief.entities[event.subject].start, np.zeros(POSE)
     if not call_locate(sensor.locate, (belief, sensor, event, z, pose)):
         return False

@@ -113,12 +113,11 @@ class EntityMemory(Record):
     count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, received yaw_age_s
     ago; turn_rate [rad/s]: mean until then; turned [rad]: what it is taken to have turned since; keeps_heading: 1 if it
     has neither jumped nor paused since a sighting agreed with the belief's; heading_at: when one last did, or was used
-    without its heading. velocity_x, _y, _z:
-    how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed camera's surprises add
-    to the error of the reported velocity; noted_error [m/s]: by how much that error was recently seen to exceed that of
-    a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far beyond the
-    gate; wild_x, _y: where the last of them puts it, relative to its belief [m; world]; astray: landmarks read far
-    beyond the gate; refused: observations by which it would have joined if they had not contradicted their observer;
+    without its heading. velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]:
+    deviation that surprises of a fixed camera, or of landmarks that it reads, add to the error of the reported
+    velocity; noted_error [m/s]: by how much that error was recently seen to exceed that of a sound sensor; unseen_s:
+    time predicted since the last sighting. wild: observations far beyond the gate; wild_x, _y: where the last of them
+    puts it, relative to its belief [m; world]; astray: landmarks read far beyond the gate; refused: observations by which it would have joined if they had not contradicted their observer;
     corrected_at: last use of an observation; seen_variance: of the worse of x and y [m^2] right after it. gave_up,
     gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's sightings, the last time, and the
     last robot.

@@ -111,6 +111,8 @@ class AttitudeControl:
         deaf = decision.action is Action.FLY and not report.obeys
         holds = deaf or decision.action is Action.HOVER
         back = decision.back_m_s if holds else None
+        if deaf:
+            self._loop.lose()
         if holds and report.fresh and back is None:
             return self._loop.hold(report.velocity_m_s, dt_s)
         if not report.fresh:

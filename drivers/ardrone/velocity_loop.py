@@ -17,8 +17,9 @@ from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 _LONGEST_STEP_S = 0.1
 # Time constant for following the speed of a drone that holds its place by itself: it covers noise, and its braking.
 _HELD_S = 0.15
-# Share of a first measured speed that is motion: half of it is noise of a drone that holds its place.
-_OF_HOVER = 0.5
+# Share of a first measured speed that is motion: half of it is noise of a drone that holds its place. All of it, for
+# this time, after a drone was not heard or did not hear: it flew its last attitude on.
+_OF_HOVER, _FLEW_ON_S = 0.5, 0.5
 # A drone that reports to stand and does not lags behind its commands by more than this; integral of the excess at which
 # that counts, and how fast it shrinks.
 _STANDS_OFF_M_S, _STANDS_OFF_M, _FORGETS_M_S = 0.15, 0.05, 0.2
@@ -52,6 +53,7 @@ class VelocityLoop:
         self._max_acceleration = STANDARD_GRAVITY_M_S2 * math.tan(limits.max_tilt_rad)
         self._gains = gains or Gains()
         self._axes = (Axis(self._gains), Axis(self._gains))
+        self._flew_on_s = 0.0
         self._drifts = (OdometryDrift(DriftLimits()), OdometryDrift(DriftLimits()))
         self.reset()
 
@@ -73,20 +75,20 @@ class VelocityLoop:
         self._flying = False
         self._still_s = self._stands_off_m = 0.0
         self._held_m_s: tuple[float, float] | None = None
-        self._believed = _OF_HOVER
         for drift in self._drifts:
             drift.reset()
 
     def lose(self) -> None:
-        """Forget the motion of a drone that is not heard: it may fly its last attitude on."""
+        """Forget the motion of a drone that is not heard, or does not hear: it may fly its last attitude on."""
         self.reset()
-        self._believed = 1.0
+        self._flew_on_s = _FLEW_ON_S
 
     def hold(self, measured_m_s: Vector3, dt_s: float) -> AttitudeRequest:
         """Let the drone hold its place, and note its true (scaled) speed, from which it is braked if it goes blind."""
         x, y, _ = measured_m_s
         before_x, before_y = self._held_m_s or (x, y)
         share = min(1.0, max(dt_s, 0.0) / _HELD_S)
+        self._flew_on_s = max(0.0, self._flew_on_s - dt_s)
         self.reset()
         self._held_m_s = before_x + share * (x - before_x), before_y + share * (y - before_y)
         return HOVER
@@ -193,7 +195,8 @@ class VelocityLoop:
             self._flying = True
             first: tuple[float, ...] = self._held_m_s or (0.0, 0.0)
             if measured_m_s is not None:
-                first = tuple(self._believed * v for v in measured_m_s)
+                share = 1.0 if self._flew_on_s > 0.0 else _OF_HOVER
+                first = tuple(share * v for v in measured_m_s)
             self._held_m_s = None
             for axis, speed in zip(axes, first, strict=False):
                 axis.start(speed)

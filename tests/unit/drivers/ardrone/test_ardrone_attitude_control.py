@@ -78,8 +78,14 @@ def test_a_velocity_that_contradicts_what_was_asked_for_is_doubted_until_it_land
     assert not turns.control.doubted
 
 
-def test_one_that_flew_its_last_tilt_on_while_its_link_was_silent_contradicts_nothing(turns) -> None:
+@pytest.mark.parametrize(
+    "before", [[], [(Action.HOVER, SOUND, 0.2)], [(Action.FLY, SOUND._replace(obeys=False), 0.5)]],
+    ids=["at once", "after a moment of hover", "deaf besides"],
+)  # fmt: skip
+def test_one_that_flew_its_last_tilt_on_while_its_link_was_silent_contradicts_nothing(turns, before) -> None:
     turns(Action.HOVER, SILENT, 0.7)
+    for action, report, seconds in before:
+        turns(action, report._replace(velocity_m_s=(0.6, 0.0, 0.0)), seconds, velocity_m_s=(-0.3, 0.0, 0.0))
     for speed_m_s in (0.6, 0.7, 0.7, 0.65, 0.55, 0.45, 0.35, 0.25, 0.15):
         turns(Action.FLY, SOUND._replace(velocity_m_s=(speed_m_s, 0.0, 0.0)), velocity_m_s=(-0.3, 0.0, 0.0))
     assert turns.control.doubted == ""

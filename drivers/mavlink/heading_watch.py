@@ -27,17 +27,21 @@ class HeadingWatch:
         self.reason = ""
         self._since_ns: int | None = None
 
+    def lose(self) -> None:
+        """Note that it cannot be compared now: what was seen before is not in a row with what follows."""
+        self._since_ns = None
+
     def take(self, now_ns: int, estimate: EntityEstimate, heading_rad: float) -> None:
         """Take the tracker's estimate of the vehicle in flight, and its heading now by its own report [rad; world]."""
         known = len(estimate.covariance) == 16 and estimate.covariance[15] <= _KNOWN_RAD**2
         if estimate.age_s > _SEEN_S or not known:
-            self._since_ns = None
+            self.lose()
             return
         off_rad = abs(wrap(heading_rad - estimate.mean[3]))
         if not (off_rad < _FOUND_RAD if self.reason else off_rad > _OFF_RAD):
-            self._since_ns = None
+            self.lose()
             return
         self._since_ns = now_ns if self._since_ns is None else self._since_ns
         if now_ns - self._since_ns >= (_FOUND_NS if self.reason else _OFF_NS):
-            off = f"its heading is off by {math.degrees(off_rad):.0f} deg from what cameras see"
+            off = f"its heading is off by {math.degrees(off_rad):.0f} deg from the tracker's"
             self.reason, self._since_ns = "" if self.reason else off, None

@@ -51,7 +51,7 @@ _BY_SETTING = {
 _JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE", "FILE_TRANSFER_PROTOCOL"))
 _JUDGED |= {REQUEST_EVENT}
 # WIRE (docs/reference/mavlink.md 5.11): QGroundControl asks for one at a time, and PX4 answers for each, known or not.
-_MOST_EVENTS = 8
+_MOST_EVENTS = 1
 
 
 def may_pass(number: int, allowed: Collection[str] = ()) -> bool:

@@ -187,8 +187,10 @@ class MavlinkVehicle:
     def _compare_heading(self, now_ns: int, good: EntityEstimate | None, known: LatestTelemetry) -> None:
         if not self.orders.lift.lifted:
             self._heading.reset()
-        elif good is not None and (attitude := known.attitude_at(now_ns)) is not None:
+        elif good is not None and known.tells_attitude(now_ns) and (attitude := known.attitude_at(now_ns)) is not None:
             self._heading.take(now_ns, good, attitude.yaw_rad)
+        else:
+            self._heading.lose()
 
     def view(self, now_ns: int) -> VehicleView:
         """Return the vehicle's last reported state."""

@@ -47,3 +47,11 @@ def test_it_is_trusted_again_when_it_has_been_right_for_a_second_and_on_the_floo
     seen(90.0, 1.0)
     seen.watch.reset()
     assert seen.watch.reason == ""
+
+
+def test_two_headings_with_nothing_to_compare_between_them_are_not_in_a_row() -> None:
+    seen = Watched()
+    seen(90.0, 0.05)
+    seen.watch.lose()
+    seen.now_ns += 5000 * NS_PER_MS
+    assert seen(90.0, 0.05) == ""

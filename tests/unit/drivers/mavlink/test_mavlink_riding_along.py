@@ -136,14 +136,15 @@ def test_a_stop_is_told_in_words(stop, flavour, words):
     [
         (7, 7, SYSTEM, Passage.PASS),
         (0, 0, SYSTEM, Passage.PASS),
-        (65535, 2, SYSTEM, Passage.PASS),
+        (65535, 65535, SYSTEM, Passage.PASS),
+        (65535, 0, SYSTEM, Passage.DROP),
         (8, 7, SYSTEM, Passage.DROP),
-        (0, 8, SYSTEM, Passage.DROP),
+        (0, 1, SYSTEM, Passage.DROP),
         (7, 7, SYSTEM + 1, Passage.DROP),
     ],
-    ids=["one", "the first", "across the end", "all 65536", "nine", "of another vehicle"],
+    ids=["one", "the first", "the last", "two across the end", "all 65536", "two", "of another vehicle"],
 )
-def test_it_may_ask_for_a_few_events_that_it_has_missed(first, last, system, passage):
+def test_it_may_ask_for_one_event_at_a_time_that_it_has_missed(first, last, system, passage):
     payload = struct.pack("<HHBB", first, last, system, 1)
     raw = bytes((0xFD, len(payload), 0, 0, 0, 255, 190)) + REQUEST_EVENT.to_bytes(3, "little") + payload + b"\0\0"
     assert may_pass(REQUEST_EVENT)

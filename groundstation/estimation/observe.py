@@ -90,8 +90,8 @@ def confront_place(state: State, tables: Tables, event: EventRow, hypothesis: Hy
 @kernel()
 def face_subject(
     state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis, insists: bool
-) -> bool:  # fmt: skip
-    """Let an observer of unknown heading face what it reads, in all modes, and confront it anew; True if it turned."""
+) -> None:  # fmt: skip
+    """Let an observer of unknown heading face what it reads, in all modes, and confront it anew."""
     turned, sensor = False, tables.sensors[event.sensor]
     for m in range(state.means.shape[0]):
         belief, innovation = belief_of(state, tables, m), hypothesis.innovations[m]
@@ -100,7 +100,6 @@ def face_subject(
     if turned:
         set_noise(hypothesis.innovations, hypothesis.R)
         confront(state, tables, event, rows, hypothesis)
-    return turned
 
 
 @kernel()
@@ -171,7 +170,7 @@ def note_use(state: State, first: Belief, event: EventRow) -> None:
 def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
     """Correct by one observation, or record why not: gate, choice of hypothesis, joining, re-initialisation."""
     modes, sensor, settings = state.means.shape[0], tables.sensors[event.sensor], tables.settings
-    subject, first = state.memory[event.subject], belief_of(state, tables, 0)
+    subject, first, believed = state.memory[event.subject], belief_of(state, tables, 0), state.means.copy()
     # First axis: the pose as measured, and its alternative.
     z, R, HP = np.zeros((2, MAX_ROWS)), np.zeros((2, MAX_ROWS, MAX_ROWS)), np.empty((2, modes, 4, state.means.shape[1]))
     innovations = np.zeros((2, modes), _INNOVATION)
@@ -189,8 +188,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     if not fresh:
         if choose(state, tables, event, rows, unused_s, used, other):
             used, out.alternative_chosen = other, 1
-        believed = state.means.copy()
-        turned = face_subject(state, tables, event, rows, used, False)
+        face_subject(state, tables, event, rows, used, False)
         mode = likeliest(state.weights, used.innovations)
         if mode < 0:
             out.verdict = SINGULAR
@@ -205,8 +203,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
                 rows, excess = YAW, confront_place(state, tables, event, used)
                 write_outcome(out, used.innovations[mode])
             elif out.verdict != PENDING:
-                if turned:
-                    copy_matrix(believed, state.means)
+                copy_matrix(believed, state.means)
                 return
             loosened = answers_for(first, event) != event.subject
             joins = out.verdict == PENDING and not loosened

@@ -117,10 +117,10 @@ class EntityMemory(Record):
     deviation that surprises of a fixed camera, or of landmarks that it reads, add to the error of the reported
     velocity; noted_error [m/s]: by how much that error was recently seen to exceed that of a sound sensor; unseen_s:
     time predicted since the last sighting. wild: observations far beyond the gate; wild_x, _y: where the last of them
-    puts it, relative to its belief [m; world]; astray: landmarks read far beyond the gate; refused: observations by which it would have joined if they had not contradicted their observer;
-    corrected_at: last use of an observation; seen_variance: of the worse of x and y [m^2] right after it. gave_up,
-    gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's sightings, the last time, and the
-    last robot.
+    puts it, relative to its belief [m; world]; astray: landmarks read far beyond the gate; refused: observations by
+    which it would have joined if they had not contradicted their observer; corrected_at: last use of an observation;
+    seen_variance: of the worse of x and y [m^2] right after it. gave_up, gave_up_at, gave_up_whom: number of robots
+    recently re-initialised by this one's sightings, the last time, and the last robot.
     """
 
     active: int

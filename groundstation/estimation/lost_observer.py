@@ -1,7 +1,9 @@
 """An observer whose readings of landmarks are far beyond the gate: its own belief is wrong, for a landmark has none.
 
-Noise is added to the observer's pose until the reading lies on the gate; this and the following readings correct it.
-Nothing is cut: what the others know of the observer remains, as far as the noise leaves it.
+It faces the landmark, and moves towards or away from it as far as the reading asks for: a correction linearised with a
+heading that is far off throws it metres away (decision 0371). Where a reading gives no place, noise is added to the
+observer's pose until the reading lies on the gate. Nothing is cut: what the others know of it remains, as far as the
+noise leaves it.
 """
 
 import numpy as np
@@ -11,6 +13,7 @@ from groundstation.estimation.correction import surprise
 from groundstation.estimation.deferred import variance_of
 from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.linear import wrap
+from groundstation.estimation.model_kernels import call_locate
 from groundstation.estimation.records import (
     KIND_LANDMARK,
     KIND_ROBOT,
@@ -78,9 +81,8 @@ def face(
     yaw = entity.start + entity.at_yaw
     for i in range(innovation.prediction.size):
         by_subject = innovation.prediction.H_subject[i, subject.at_yaw] if subject.at_yaw >= 0 else 0.0
-        by_own = innovation.prediction.H_observer[
-            i, entity.at_yaw
-        ]  # -1 for a bearing: it sinks when the robot turns left
+        # -1 for a bearing: it sinks when the robot turns left.
+        by_own = innovation.prediction.H_observer[i, entity.at_yaw]
         if sensor.is_angle[i] == 0 or by_subject != 0.0 or by_own == 0.0:
             continue
         if insists or variance_of(belief.P, deferred, yaw) > _UNKNOWN_RAD2:
@@ -90,10 +92,26 @@ def face(
 
 
 @kernel()
-def note_turn(belief: Belief, e: int, before: Vector) -> None:
-    """Add the square of a turn to the variance of the heading; before: the mean before it."""
-    entity = belief.entities[e]
+def approach(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector) -> None:
+    """Move an observer, without turning it, so that it reads the landmark at its place, if a reading gives a place.
+
+    If it faces the landmark, that is straight towards it or away from it, and no farther than it is off.
+    """
+    off, start = np.zeros(POSE), belief.entities[event.observer].start
+    # A landmark has no block: it is located relative to its own place.
+    if call_locate(sensor.locate, (belief, sensor, event, z, off)):
+        belief.mean[start + X] -= off[X]
+        belief.mean[start + Y] -= off[Y]
+
+
+@kernel()
+def note_move(belief: Belief, e: int, before: Vector) -> None:
+    """Add the square of a move and a turn by hand to the variances of x, y and heading; before: the mean before it."""
+    entity, mean, P = belief.entities[e], belief.mean, belief.P
+    x, y = entity.start + X, entity.start + Y
+    moved_m2 = (mean[x] - before[x]) ** 2 + (mean[y] - before[y]) ** 2
+    P[x, x] += moved_m2
+    P[y, y] += moved_m2
     if entity.at_yaw >= 0:
         yaw = entity.start + entity.at_yaw
-        turned = wrap(belief.mean[yaw] - before[yaw])
-        belief.P[yaw, yaw] += turned * turned
+        P[yaw, yaw] += wrap(mean[yaw] - before[yaw]) ** 2

@@ -11,8 +11,7 @@ from groundstation.estimation.deferred import make_all, variance_of
 from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.joining import admit
-from groundstation.estimation.linear import copy_matrix
-from groundstation.estimation.lost_observer import answers_for, face, loosen, note_turn
+from groundstation.estimation.lost_observer import answers_for, approach, face, loosen, note_move
 from groundstation.estimation.motion import clear, enter, join
 from groundstation.estimation.outliers import agree, blame, doubt_velocity, forget_noted_error, note_given_up
 from groundstation.estimation.records import (
@@ -103,25 +102,22 @@ def face_subject(
 
 
 @kernel()
-def loosen_observer(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis) -> float:
-    """Loosen the observer's belief in all modes for a landmark's reading; returns its excess over the gate.
+def place_observer(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis) -> float:
+    """Place the observer of a landmark by its reading, in all modes; returns the excess over the gate, at least 1.
 
-    If a turn alone explains the reading, the observer is turned; otherwise noise is added to its whole pose.
+    What then remains beyond the gate loosens its belief. No correction is deferred when it is called.
     """
-    settings, means = tables.settings, state.means.copy()
-    gate = settings.gates[rows]
+    gate, means = tables.settings.gates[rows], state.means.copy()
     face_subject(state, tables, event, rows, hypothesis, True)
-    turns = least_nis(hypothesis.innovations) <= settings.wild_gates * gate
-    if not turns:
-        copy_matrix(means, state.means)
-        set_noise(hypothesis.innovations, hypothesis.R)
-        confront(state, tables, event, rows, hypothesis)
     for m in range(means.shape[0]):
         belief = belief_of(state, tables, m)
-        if turns:
-            note_turn(belief, event.observer, means[m])
-        elif hypothesis.innovations[m].nis >= 0.0:
-            loosen(belief, event, hypothesis.innovations[m], gate)
+        approach(belief, tables.sensors[event.sensor], event, hypothesis.z)
+        note_move(belief, event.observer, means[m])
+    set_noise(hypothesis.innovations, hypothesis.R)
+    confront(state, tables, event, rows, hypothesis)
+    for m in range(means.shape[0]):
+        if hypothesis.innovations[m].nis > gate:
+            loosen(belief_of(state, tables, m), event, hypothesis.innovations[m], gate)
     set_noise(hypothesis.innovations, hypothesis.R)
     confront(state, tables, event, rows, hypothesis)
     excess: float = least_nis(hypothesis.innovations) / gate
@@ -183,7 +179,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     if out.verdict != PENDING:
         return
     set_noise(used.innovations, used.R)
-    gate, fresh, excess, loosened = settings.gates[rows], subject.active == 0, 1.0, False
+    gate, fresh, excess, placed = settings.gates[rows], subject.active == 0, 1.0, False
     joins, confirmed = fresh, subject.unconfirmed == 0
     if not fresh:
         if choose(state, tables, event, rows, unused_s, used, other):
@@ -205,13 +201,13 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
             elif out.verdict != PENDING:
                 copy_matrix(believed, state.means)
                 return
-            loosened = answers_for(first, event) != event.subject
-            joins = out.verdict == PENDING and not loosened
-            if loosened:
-                excess = loosen_observer(state, tables, event, rows, used)
-        judge(first, event, rows, excess == 1.0 and not loosened, joins)
+            placed = answers_for(first, event) != event.subject
+            joins = out.verdict == PENDING and not placed
+            if placed:
+                excess = place_observer(state, tables, event, rows, used)
+        judge(first, event, rows, excess == 1.0 and not placed, joins)
     if out.verdict != TURNED:
-        out.verdict = INFLATED if excess > 1.0 or loosened else ACCEPTED
+        out.verdict = INFLATED if excess > 1.0 or placed else ACCEPTED
     if joins:
         make_all(state)
         out.verdict = admit(state, tables, event, rows, used)

@@ -102,6 +102,15 @@ class Team:
         return belief.mean_of(name), belief.covariance_of(name)
 
 
+class Blinkered(Team):
+    """Robots that read posts only."""
+
+    def read(self, observer: str, subject: str, depth: float, bearing: float) -> None:
+        """Add a reading, unless it is of a robot."""
+        if subject not in COURSES:
+            super().read(observer, subject, depth, bearing)
+
+
 def worst_m(team: Team, seconds: int) -> dict[str, float]:
     """Return each robot's largest error, a second apart."""
     worst = dict.fromkeys(COURSES, 0.0)
@@ -126,12 +135,40 @@ def test_a_team_outlasts_one_misread_marker_in_five() -> None:
 
 @pytest.mark.parametrize(("ahead_m", "turned_rad"), [(1.5, 0.0), (0.0, 1.5), (1.0, 1.0)])
 def test_a_robot_that_was_placed_wrong_finds_its_place_by_landmarks(ahead_m: float, turned_rad: float) -> None:
-    team = Team(Faults(), 4)
-    x, y, yaw, _, _ = COURSES["c"]
-    wrong = (x + ahead_m, y, 0.0, yaw + turned_rad)
-    team.filter.place("c", wrong, (1e-4, 1e-4, 1e-6, 4e-4), START, START)
+    team = Team(Faults(c_off=(ahead_m, 0.0, turned_rad)), 4)
     team.drive(20.0)
-    assert max(team.errors_m().values()) <= 0.1
+    assert max(team.errors_m().values()) <= 0.15
+
+
+@pytest.mark.parametrize(
+    "c_off", [(0.0, 0.0, 1.57), (0.0, 0.0, 2.6), (3.0, 0.0, 0.0), (-2.1, 2.1, 0.0), (-3.0, 0.0, 2.6), (0.0, 3.0, 2.6)]
+)
+def test_a_lost_robot_that_reads_few_landmarks_is_thrown_nowhere(c_off: tuple[float, float, float]) -> None:
+    """By noise on its pose and a linearised correction it was, by up to 40 m; with a right turn before, by 16 m."""
+    few = {name: LANDMARKS[name] for name in ("post_0", "post_3", "post_6")}
+    for seed in (1, 2, 3):
+        team, corrected, prior, worst = Blinkered(Faults(c_off=c_off), seed, few), False, 0.0, 0.0
+        for _ in range(300):
+            before = worst
+            team.drive(0.2)
+            used = (Verdict.ACCEPTED, Verdict.INFLATED)
+            corrected |= any(c.observer == "c" and c.verdict in used for c in team.filter.take_corrections())
+            prior = prior if corrected else max(prior, team.errors_m()["c"])
+            worst = max(worst, team.errors_m()["c"])
+            assert worst <= max(before, prior) + 1.0
+        assert team.errors_m()["c"] <= 0.3
+
+
+def test_misread_landmarks_that_a_right_one_follows_move_nobody() -> None:
+    team = Team(Faults(), 7)
+    for k in range(40):
+        team.now += 2 * 10**8
+        if k % 5 < 4:
+            team.read("c", "post_8", 2.0, 0.1)
+        else:
+            team.see("c", "post_3")
+        team.filter.advance(team.now)
+        assert team.errors_m()["c"] <= 0.2
 
 
 def test_a_robot_that_faces_the_wrong_way_turns_towards_the_landmark_that_it_reads() -> None:

@@ -11,6 +11,7 @@ from groundstation.estimation.deferred import make_all, variance_of
 from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.joining import admit
+from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.lost_observer import answers_for, approach, face, loosen, note_move
 from groundstation.estimation.motion import clear, enter, join
 from groundstation.estimation.outliers import agree, blame, doubt_velocity, forget_noted_error, note_given_up

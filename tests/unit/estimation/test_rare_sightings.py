@@ -15,12 +15,9 @@ KNOWN, SEEN_S, HEIGHT_M = (4e-4, 0.0, 0.0, 0.0, 0.0, 4e-4, 0.0, 0.0, 0.0, 0.0, 4
 def test_a_target_that_was_carried_off_and_drives_on_is_found_by_rare_sightings(
     speed_m_s: float, every_ms: int
 ) -> None:
-    entities = {
-        "rover": ConstantVelocityTarget(marker_height_m=0.3),
-        "ceiling": FixedMount((0.0, 0.0, 4.2), 0.004, 0.01),
-    }
+    rover, mount = ConstantVelocityTarget(marker_height_m=0.3), FixedMount((0.0, 0.0, 4.2), 0.004, 0.01)
     camera = MountedCamera("ceiling", WORLD_FROM_DOWN)
-    belief = FixedLagFilter(EstimatorParameters(entities, {"ceiling": camera}))
+    belief = FixedLagFilter(EstimatorParameters({"rover": rover, "ceiling": mount}, {"ceiling": camera}))
     x, y, direction, joined_s = -1.0, 0.0, 1.0, []
     for step in range(1, 1000):
         now_s, now_ns = step * 0.01, START + step * 10 * MS

@@ -99,14 +99,14 @@ class VelocityDoubt:
         if self._lasting(now_ns, "stood", stood) >= _CONFIRMED_NS:
             self._contradicts = False
         both = moves and commanded_m_s > claimed + _COMMANDED_M_S
-        seen, strays_ns = (("moves", moves), ("drifts", drifts)), _BOTH_NS if self._contradicts else _SEEN_NS
         lasting = (
-            *((what, it, _SEEN_NS) for what, it in seen),
-            ("strays", strays, strays_ns),
+            ("moves", moves, _SEEN_NS),
+            ("drifts", drifts, _SEEN_NS),
+            ("strays", strays, _BOTH_NS if self._contradicts else _SEEN_NS),
             ("both", both, _BOTH_NS),
         )
-        for_ns = [self._lasting(now_ns, what, holds) - enough_ns for what, holds, enough_ns in lasting]
-        shown = max(for_ns) >= 0
+        # All are followed at each turn: while one is shown, another may begin.
+        shown = max(self._lasting(now_ns, what, holds) - enough_ns for what, holds, enough_ns in lasting) >= 0
         fresh, self.blind = shown and not self.blind, self.blind or shown
         return fresh
 

@@ -50,8 +50,6 @@ _BY_SETTING = {
 }
 _JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE", "FILE_TRANSFER_PROTOCOL"))
 _JUDGED |= {REQUEST_EVENT}
-# WIRE (docs/reference/mavlink.md 5.11): QGroundControl asks for one at a time, and PX4 answers for each, known or not.
-_MOST_EVENTS = 1
 
 
 def may_pass(number: int, allowed: Collection[str] = ()) -> bool:
@@ -73,7 +71,8 @@ def passage_of(
     """
     if number == REQUEST_EVENT and raw:
         request = event_request_of(raw)
-        return Passage.PASS if request.system == system and request.events <= _MOST_EVENTS else Passage.DROP
+        # WIRE (docs/reference/mavlink.md 5.11): QGroundControl asks for one at a time, and PX4 answers for each.
+        return Passage.PASS if request.system == system and request.first == request.last else Passage.DROP
     match message:
         case flight.CommandLong() | flight.CommandInt() if message.target_system in (0, system):
             return _of_command(message, flavour)

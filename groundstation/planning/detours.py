@@ -74,6 +74,8 @@ class Detours:
             wide_m = max(self.keep_m, keep_m + _BESIDE_M)
             fence = self.fence.shrunk(self.margin_m + doubt_m + _NARROWLY_M)
             wide = _way(place, goal, self._outlines(height_m, wide_m), wide_m, _BESIDE_M, fence)
+            if wide is not None and wide.is_straight and wide.next_m == goal:
+                return wide
             # Between an obstacle and the fence only a narrow way may end near the goal.
             farther_m = self._short_m(goal, height_m, wide_m, fence) - self._short_m(goal, height_m, keep_m, fence)
             ends_near = not farther_m > wide_m - keep_m + _TOUCH_M

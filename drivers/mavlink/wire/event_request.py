@@ -17,11 +17,6 @@ class EventRequest(NamedTuple):
     system: int
     component: int
 
-    @property
-    def events(self) -> int:
-        """Return how many events are asked for."""
-        return (self.last - self.first) % 65536 + 1
-
 
 def event_request_of(frame: bytes) -> EventRequest:
     """Return the content of a verified frame of MAVLink 2.

@@ -34,3 +34,21 @@ def test_a_clock_that_begins_anew_jumps_after_a_gap_too() -> None:
 
 def test_of_two_vehicles_with_one_id_each_change_is_told() -> None:
     assert jumps((0, 5000), (20, 11_020), (40, 5040), (60, 11_060)) == [0, 6000, -6000, 6000]
+
+
+@pytest.mark.parametrize(
+    ("stamps_ms", "jump_ms", "why"),
+    [
+        ([1000, 1020], -14_980, "it stood still, or its telemetry was held back"),
+        ([90_000, 500], -104_500, "it restarted, or two vehicles share its system id"),
+        ([1000, 60_000], 44_000, "it restarted, or two vehicles share its system id"),
+    ],
+)
+def test_a_clock_that_goes_on_behind_after_a_pause_belongs_to_no_restart(
+    stamps_ms: list[int], jump_ms: int, why: str
+) -> None:
+    clock = BootClock()
+    first, second = stamps_ms
+    assert clock.take(10_000 * MS, first) == 0
+    assert (clock.take(25_000 * MS, second), clock.why) == (jump_ms, why)
+    assert clock.restarted is (second < first)

@@ -4,7 +4,7 @@ from collections import deque
 
 import pytest
 
-from drivers.mavlink.texts import BootClock, Texts
+from drivers.mavlink.texts import Texts
 from drivers.mavlink.wire.telemetry import Statustext
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -89,21 +89,3 @@ def test_a_reason_that_is_old_says_so() -> None:
 
 def test_the_tab_at_the_end_of_a_px4s_text_is_not_told() -> None:
     assert told(Texts(), S, [Statustext(6, "Takeoff detected\t")]) == ["Takeoff detected"]
-
-
-@pytest.mark.parametrize(
-    ("stamps_ms", "jump_ms", "why"),
-    [
-        ([1000, 1020], -14_980, "it stood still, or its telemetry was held back"),
-        ([90_000, 500], -104_500, "it restarted, or two vehicles share its system id"),
-        ([1000, 60_000], 44_000, "it restarted, or two vehicles share its system id"),
-    ],
-)
-def test_a_clock_that_goes_on_behind_after_a_pause_belongs_to_no_restart(
-    stamps_ms: list[int], jump_ms: int, why: str
-) -> None:
-    clock = BootClock()
-    first, second = stamps_ms
-    assert clock.take(10 * S, first) == 0
-    assert (clock.take(25 * S, second), clock.why) == (jump_ms, why)
-    assert clock.restarted is (second < first)

@@ -8,20 +8,17 @@ import math
 import numpy as np
 
 from groundstation.estimation.deferred import make_all, variance_of
-from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
+from groundstation.estimation.evidence import confront, likeliest, set_noise, weigh
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.joining import admit
-from groundstation.estimation.linear import copy_matrix
-from groundstation.estimation.lost_observer import answers_for, approach, face, loosen, note_move
 from groundstation.estimation.motion import clear, enter, join
-from groundstation.estimation.outliers import agree, blame, doubt_velocity, forget_noted_error, note_given_up
+from groundstation.estimation.outliers import forget_noted_error, note_given_up
 from groundstation.estimation.records import (
     ACCEPTED,
     ADMITTED,
     CONTRADICTED,
     DISMISSED,
     INFLATED,
-    KIND_CAMERA,
     KIND_ROBOT,
     KIND_TARGET,
     MAX_ROWS,
@@ -30,10 +27,8 @@ from groundstation.estimation.records import (
     PENDING,
     PLACED,
     POSE,
-    SINGULAR,
     SUBJECT_GROUNDED,
     TURNED,
-    YAW,
     YAW_MISSING,
     EventRow,
     Innovation,
@@ -42,7 +37,8 @@ from groundstation.estimation.records import (
     X,
     Y,
 )
-from groundstation.estimation.update import correct, note_motion, read, write_ahead, write_outcome
+from groundstation.estimation.update import correct, note_motion, read, write_outcome
+from groundstation.estimation.verdict import Tested, confirm
 from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
@@ -78,53 +74,6 @@ def choose(
     return confront(state, tables, event, rows, other) > evidence
 
 
-@kernel()
-def confront_place(state: State, tables: Tables, event: EventRow, hypothesis: Hypothesis) -> float:
-    """Confront the belief with a sighting's place without its heading; returns its excess over the gate, at least 1."""
-    set_noise(hypothesis.innovations, hypothesis.R)
-    confront(state, tables, event, YAW, hypothesis)
-    excess: float = least_nis(hypothesis.innovations) / tables.settings.gates[YAW]
-    return max(excess, 1.0)
-
-
-@kernel()
-def face_subject(
-    state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis, insists: bool
-) -> None:  # fmt: skip
-    """Let an observer of unknown heading face what it reads, in all modes, and confront it anew."""
-    turned, sensor = False, tables.sensors[event.sensor]
-    for m in range(state.means.shape[0]):
-        belief, innovation = belief_of(state, tables, m), hypothesis.innovations[m]
-        if innovation.nis >= 0.0:
-            turned = face(belief, deferred_of(state, m), sensor, event, innovation, insists) or turned
-    if turned:
-        set_noise(hypothesis.innovations, hypothesis.R)
-        confront(state, tables, event, rows, hypothesis)
-
-
-@kernel()
-def place_observer(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis) -> float:
-    """Place the observer of a landmark by its reading, in all modes; returns the excess over the gate, at least 1.
-
-    What then remains beyond the gate loosens its belief. No correction is deferred when it is called.
-    """
-    gate, means = tables.settings.gates[rows], state.means.copy()
-    face_subject(state, tables, event, rows, hypothesis, True)
-    for m in range(means.shape[0]):
-        belief = belief_of(state, tables, m)
-        approach(belief, tables.sensors[event.sensor], event, hypothesis.z)
-        note_move(belief, event.observer, means[m])
-    set_noise(hypothesis.innovations, hypothesis.R)
-    confront(state, tables, event, rows, hypothesis)
-    for m in range(means.shape[0]):
-        if hypothesis.innovations[m].nis > gate:
-            loosen(belief_of(state, tables, m), event, hypothesis.innovations[m], gate)
-    set_noise(hypothesis.innovations, hypothesis.R)
-    confront(state, tables, event, rows, hypothesis)
-    excess: float = least_nis(hypothesis.innovations) / gate
-    return max(excess, 1.0)
-
-
 @kernel(inlined=True)
 def correct_modes(state: State, tables: Tables, used: Hypothesis, excess: float) -> None:
     """Correct all modes that can use the observation, with S raised by `excess`."""
@@ -145,16 +94,6 @@ def note_place(belief: Belief, deferred: Deferred, e: int) -> None:
 
 
 @kernel(inlined=True)
-def judge(belief: Belief, event: EventRow, rows: int, agrees: bool, joins: bool) -> None:
-    """Note whether an observation agrees with the belief that it tests, or what its surprise makes doubtful."""
-    answering = answers_for(belief, event)
-    if agrees:
-        agree(belief.memory[answering], event.at, rows)
-    elif not joins and (answering != event.subject or belief.entities[event.observer].kind == KIND_CAMERA):
-        doubt_velocity(belief.memory[answering])
-
-
-@kernel(inlined=True)
 def note_use(state: State, first: Belief, event: EventRow) -> None:
     """Note that the subject was corrected by the event."""
     subject = state.memory[event.subject]
@@ -164,10 +103,26 @@ def note_use(state: State, first: Belief, event: EventRow) -> None:
 
 
 @kernel()
+def let_join(state: State, tables: Tables, event: EventRow, rows: int, used: Hypothesis, out: OutcomeRow) -> bool:
+    """Let the subject join by an observation, or give up its belief for it; False if it may not yet."""
+    subject, kind = state.memory[event.subject], tables.entities[0, event.subject].kind
+    fresh, confirmed = subject.active == 0, subject.unconfirmed == 0
+    make_all(state)
+    out.verdict = admit(state, tables, event, rows, used)
+    if fresh and out.verdict == CONTRADICTED:
+        write_outcome(out, used.innovations[likeliest(state.weights, used.innovations)])
+    if out.verdict != ACCEPTED and out.verdict != INFLATED:
+        return False
+    if not fresh and confirmed and kind == KIND_ROBOT:
+        note_given_up(state.memory[event.observer], event.subject, event.at)
+    out.joined = 1
+    return True
+
+
+@kernel()
 def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
     """Correct by one observation, or record why not: gate, choice of hypothesis, joining, re-initialisation."""
-    modes, sensor, settings = state.means.shape[0], tables.sensors[event.sensor], tables.settings
-    subject, first, believed = state.memory[event.subject], belief_of(state, tables, 0), state.means.copy()
+    modes, sensor, first = state.means.shape[0], tables.sensors[event.sensor], belief_of(state, tables, 0)
     # First axis: the pose as measured, and its alternative.
     z, R, HP = np.zeros((2, MAX_ROWS)), np.zeros((2, MAX_ROWS, MAX_ROWS)), np.empty((2, modes, 4, state.means.shape[1]))
     innovations = np.zeros((2, modes), _INNOVATION)
@@ -180,49 +135,24 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     if out.verdict != PENDING:
         return
     set_noise(used.innovations, used.R)
-    gate, fresh, excess, placed = settings.gates[rows], subject.active == 0, 1.0, False
-    joins, confirmed = fresh, subject.unconfirmed == 0
-    if not fresh:
+    tested = Tested(rows, 1.0, False, True)
+    if state.memory[event.subject].active != 0:
         if choose(state, tables, event, rows, unused_s, used, other):
             used, out.alternative_chosen = other, 1
-        face_subject(state, tables, event, rows, used, False)
-        mode = likeliest(state.weights, used.innovations)
-        if mode < 0:
-            out.verdict = SINGULAR
+        tested = confirm(state, tables, event, rows, used, out)
+    if out.verdict == PENDING:
+        out.verdict = INFLATED if tested.excess > 1.0 or tested.placed else ACCEPTED
+    elif out.verdict != TURNED:
+        return
+    excess = tested.excess
+    if tested.joins:
+        if not let_join(state, tables, event, rows, used, out):
             return
-        write_outcome(out, used.innovations[mode])
-        write_ahead(out, first.entities[event.subject], used.innovations[mode])
-        excess = max(least_nis(used.innovations) / gate, 1.0)
-        if excess > settings.wild_gates:
-            make_all(state)
-            out.verdict = blame(first, deferred_of(state, 0), sensor, settings, event, rows, used)
-            if out.verdict == TURNED:
-                rows, excess = YAW, confront_place(state, tables, event, used)
-                write_outcome(out, used.innovations[mode])
-            elif out.verdict != PENDING:
-                copy_matrix(believed, state.means)
-                return
-            placed = answers_for(first, event) != event.subject
-            joins = out.verdict == PENDING and not placed
-            if placed:
-                excess = place_observer(state, tables, event, rows, used)
-        judge(first, event, rows, excess == 1.0 and not placed, joins)
-    if out.verdict != TURNED:
-        out.verdict = INFLATED if excess > 1.0 or placed else ACCEPTED
-    if joins:
-        make_all(state)
-        out.verdict = admit(state, tables, event, rows, used)
-        if fresh and out.verdict == CONTRADICTED:
-            write_outcome(out, used.innovations[likeliest(state.weights, used.innovations)])
-        if out.verdict != ACCEPTED and out.verdict != INFLATED:
-            return
-        if not fresh and confirmed and first.entities[event.subject].kind == KIND_ROBOT:
-            note_given_up(state.memory[event.observer], event.subject, event.at)
-        excess, out.joined = 1.0, 1
+        excess = 1.0
     correct_modes(state, tables, used, excess)
-    if joins:
+    if tested.joins:
         make_all(state)  # a diffuse prior is too wide for deferred corrections beside it
-    weigh(state.weights, used.innovations, rows, excess)
+    weigh(state.weights, used.innovations, tested.rows, excess)
     note_use(state, first, event)
 
 

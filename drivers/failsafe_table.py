@@ -64,6 +64,8 @@ class Condition(StrEnum):
     TOO_FAST = auto()
     FLOWN_TOO_FAST = auto()
     CROWDED = auto()
+    OUTSIDE = auto()
+    FLOWN_OUTSIDE = auto()
     ON_FLOOR = auto()
     FLIES_AWAY = auto()
     LANDING_OVERDUE = auto()
@@ -188,6 +190,10 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  modes=FREE),
         # Hovering and tracking drones are moved apart: this is for when that fails.
         Failsafe(Condition.CROWDED, land, "{why}", limits.crowded_land_s, "", SLOWLY, modes=FREE),
+        # Nobody stays outside, be it in a hover that nothing ends; one that is on its way back is not counted.
+        Failsafe(Condition.OUTSIDE, land, "{why}", limits.land_after_s, patience, SLOWLY),
+        # Others obey no limiter of ours; no order but LAND stops what they fly.
+        Failsafe(Condition.FLOWN_OUTSIDE, land, "{why}, not by our orders", limits.flown_outside_s, "", SLOWLY),
         # A pilot has landed it, or it was pressed down: its controllers wind up until it notices its landing.
         Failsafe(Condition.ON_FLOOR, land, "it has come down to the floor", limits.floor_land_s, modes=FREE),
     )  # fmt: skip
@@ -205,6 +211,7 @@ def _suspensions(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.SETPOINTS_PATCHY, "the tracker's velocities come in bits only", limits.resume_within_s, SLOWLY),
         (Condition.STRAYS, "it does not do what it is told: {why}", 0.0, None),
         (Condition.TOO_FAST, "{why}", limits.fast_resume_s, SLOWLY),
+        (Condition.OUTSIDE, "{why}", limits.outside_hover_s, SLOWLY),
     )
     return tuple(
         Failsafe(condition, Reaction.HOVER, text, after_s, "", forgets, Latch.RESUME, _TRACK)

@@ -8,6 +8,7 @@ from drivers.announcements import Announcements
 from drivers.base import HostProcess, Vehicle
 from drivers.coming_down import ComingDown, away
 from drivers.control_error import ControlErrorMonitor
+from drivers.fence import FenceWatch
 from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
 from drivers.start_report import StartReport
@@ -66,6 +67,7 @@ class VehicleHost:
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m, limits.max_speed_m_s)
         self._unlocalised, self._touch_down, self._coming_down = UnlocalisedTime(), TouchDown(), ComingDown()
+        self._fence = FenceWatch(limits.fence_m)
 
     def call_on_commands(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a command arrives."""
@@ -119,7 +121,7 @@ class VehicleHost:
         flies_away = away(seen_m_s, climb_m_s, self.watchdog.limits.tolerated_speed_m_s)
         return view._replace(
             height_m=self._coming_down.height_m, away=flies_away, touches_down=touches, on_floor=self._touch_down.low,
-            unseen_s=unseen_s, near=near, crowded=crowded,
+            unseen_s=unseen_s, near=near, crowded=crowded, outside=self._fence.outside(now_ns, view.foreign),
         )  # fmt: skip
 
     def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:
@@ -130,6 +132,7 @@ class VehicleHost:
                 self._unlocalised.hear(now_ns, entity)
                 self._touch_down.hear(entity)
                 self._coming_down.hear(entity)
+                self._fence.hear(now_ns, entity)
 
     def _near(self, now_ns: int, aloft: bool) -> tuple[str, str]:
         """Return the neighbour too near to this vehicle's pad, if it stands, and to it, if it flies; "" if none is."""

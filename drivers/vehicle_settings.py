@@ -13,7 +13,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from drivers.watchdog_types import WatchdogLimits
 from groundstation.field.behaviour import SafetyValues
 from groundstation.field.drones import DroneLimits
-from groundstation.vectors import Vector3
+from groundstation.vectors import Bounds, Vector3
 from groundstation.vehicles import DriverProcess, VehicleOrder
 
 _SAFETY = SafetyValues()
@@ -85,15 +85,17 @@ class VehicleLimits(DriverSection):
 
 
 class SilenceLimits(DriverSection):
-    """Communication time-outs, and the separation of drones.
+    """Communication time-outs, the separation of drones, and their fence.
 
-    setpoint_lifetime_ms caps the lifetime that a setpoint may claim.
+    setpoint_lifetime_ms caps the lifetime that a setpoint may claim. fence_m: low and high along x, y and z [m; world];
+    None: unknown, then none of them is outside.
     """
 
     setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=500)] = _SAFETY.setpoint_lifetime_ms
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = _SAFETY.land_after_s
     unseen_land_after_s: Annotated[float, Field(ge=1, le=60)] = _SAFETY.unseen_land_after_s
     min_separation_m: Positive = 0.6
+    fence_m: Bounds | None = None
 
     def authority(self, limits: VehicleLimits, pad_m: tuple[float, float] | None = None) -> WatchdogLimits:
         """Return the limits of the shared watchdog for a vehicle with these limits; pad_m: where it takes off."""
@@ -107,16 +109,19 @@ class SilenceLimits(DriverSection):
             max_climb_m_s=limits.max_climb_m_s,
             pad_m=pad_m,
             min_separation_m=self.min_separation_m,
+            fence_m=self.fence_m,
         )
 
 
-def silence_limits(safety: SafetyValues) -> SilenceLimits:
-    """Return the silence limits of a field's safety section."""
+def silence_limits(order: VehicleOrder) -> SilenceLimits:
+    """Return the silence limits of a field's safety section, and its fence."""
+    safety = order.safety
     return SilenceLimits(
         setpoint_lifetime_ms=safety.setpoint_lifetime_ms,
         land_after_s=safety.land_after_s,
         unseen_land_after_s=safety.unseen_land_after_s,
         min_separation_m=safety.min_separation_m,
+        fence_m=None if order.fence is None else order.fence.bounds_m,
     )
 
 
@@ -163,7 +168,7 @@ def values_of(order: VehicleOrder) -> dict[str, Any]:
         "interface": drone.interface,
         "pad_m": drone.pad_m,
         "limits": vehicle_limits(drone.limits),
-        "safety": silence_limits(order.safety),
+        "safety": silence_limits(order),
         "velocity_scale": drone.odometry.velocity_scale,
         "velocity_std_m_s": drone.odometry.velocity_std_m_s,
         "raw_datagrams": order.raw_datagrams,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from groundstation.bus.messages import STANDING, UNHEARD, AckStage, FlightState, Vector3, Verb
 from groundstation.field.behaviour import SafetyValues
+from groundstation.vectors import Bounds
 
 _SAFETY = SafetyValues()
 
@@ -67,6 +68,8 @@ class WatchdogLimits:
     slowest descent, and what a landing takes beyond it. stands_told_s: it may stand on the floor with running motors
     before that is told; PX4 notices its landing and stops them within 4 s. pad_m: where it takes off [x, y;
     world], if known; min_separation_m: least distance of all airborne vehicles from there, and from it in flight.
+    fence_m: low and high along x, y and z [world], if known; outside_hover_s: outside of it for so long it hovers: one
+    that was pushed out at 0.6 m/s is on its way back by then; flown_outside_s: likewise it lands, if others fly it.
     """
 
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
@@ -100,6 +103,9 @@ class WatchdogLimits:
     stands_told_s: float = 5.0
     pad_m: tuple[float, float] | None = None
     min_separation_m: float = 0.6
+    fence_m: Bounds | None = None
+    outside_hover_s: float = 1.0
+    flown_outside_s: float = 0.3
 
     @property
     def tolerated_speed_m_s(self) -> float:
@@ -121,8 +127,9 @@ class VehicleView(NamedTuple):
     horizontal; climb_m_s, of one that others fly; stray: how the vehicle strays from its commands, or "", and stray_by,
     which of its velocities says so; seen: whether cameras show its speed. unseen_s: how long its estimate may have been
     wrong, by the tracker; near: airborne vehicle too near to its pad, or ""; crowded: why it makes way for another that
-    is too near in flight, or "". lost_s: how long it has lacked a position that it needs; unlocated: whose, and since
-    when, in words. clears: whether a separate order ends its emergency without starting motors.
+    is too near in flight, or ""; outside: how far it is outside the fence, if not on its way back to us, or "". lost_s:
+    how long it has lacked a position that it needs; unlocated: whose, and since when, in words. clears: whether a
+    separate order ends its emergency without starting motors.
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: how it flies home or climbs by itself, and in which mode, or "".
@@ -147,6 +154,7 @@ class VehicleView(NamedTuple):
     unseen_s: float = 0.0
     near: str = ""
     crowded: str = ""
+    outside: str = ""
     lost_s: float = 0.0
     unlocated: str = "from the cameras"
     clears: bool = False

@@ -2,6 +2,8 @@
 
 Interval = tuple[float, float]
 """Lower and upper bound."""
+Bounds = tuple[Interval, Interval, Interval]
+"""Lower and upper bounds along x, y and z."""
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

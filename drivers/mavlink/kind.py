@@ -95,7 +95,7 @@ def _settings(orders: Sequence[VehicleOrder]) -> MavlinkDriverSettings:
     return MavlinkDriverSettings(
         link=LinkSettings(kind=mavlink.link, target=_target(first, mavlink), key_file=mavlink.key_file),
         vehicles=tuple(_vehicle(order) for order in orders),
-        safety=silence_limits(first.safety),
+        safety=silence_limits(first),
         vision=VisionFeedback(rate_hz=mavlink.vision_hz),
         raw_datagrams=first.raw_datagrams,
     )

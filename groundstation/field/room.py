@@ -5,7 +5,7 @@ from typing import Literal
 
 import msgspec
 
-from groundstation.vectors import Interval, Vector2, Vector3
+from groundstation.vectors import Bounds, Interval, Vector2, Vector3
 
 # A person sets a drone on its cross to a centimetre; a drone farther off stands somewhere else [m].
 OFF_PAD_M = 0.25
@@ -19,6 +19,11 @@ class Fence(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     x_m: Interval
     y_m: Interval
     z_m: Interval
+
+    @property
+    def bounds_m(self) -> Bounds:
+        """Return its bounds along x, y and z [m; world]."""
+        return self.x_m, self.y_m, self.z_m
 
 
 class RoomObstacle(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -173,6 +173,7 @@ def vehicle_order(field: Field, name: str) -> VehicleOrder:
         field.room.fence.z_m[1],
         field.recording.enabled and field.recording.raw_datagrams,
         field.drones[name].sections,
+        values.room.fence,
     )
 
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from groundstation.field.behaviour import SafetyValues
 from groundstation.field.drones import FieldDrone
+from groundstation.field.room import Fence
 
 # Path of keys below the drone in the field file, and the fault there.
 Finding = tuple[tuple[str | int, ...], str]
@@ -59,7 +60,7 @@ class VehicleOrder:
     """The order that a kind gets for one drone of a field.
 
     index: its place among all drones; sections: those keys of the field file that only its kind has, None left out;
-    top_m: of the fence; raw_datagrams: whether they are recorded.
+    top_m: of the fence; raw_datagrams: whether they are recorded. fence: that of the field; None: that is unknown.
     """
 
     name: str
@@ -69,6 +70,7 @@ class VehicleOrder:
     top_m: float
     raw_datagrams: bool
     sections: Mapping[str, KindSection] = field(default_factory=lambda: _NONE)
+    fence: Fence | None = None
 
     def section(self, key: str, default: _Section) -> _Section:
         """Return a section of the kind's own, or the default if the field file has none."""

@@ -36,7 +36,7 @@ from sim_bridge.study.faults.observed import ObservedValues
 from sim_bridge.study.faults.orders import TeamOrders
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
 from sim_bridge.study.faults.tracker_feed import Arrivals, InlineWorker
-from sim_bridge.study.faults.vehicles import Drivers, Section, devices_of, on_pads
+from sim_bridge.study.faults.vehicles import Drivers, Section, devices_of, placed
 from sim_bridge.study.faults.wrong_cameras import WrongEye
 from sim_bridge.study.wrong_figures import WrongFigures, misdated
 from sim_bridge.world.noise import generator_of
@@ -85,7 +85,7 @@ class FaultFlight:
         with manual_clock(lambda: self.now_ns), in_memory(self._network) as self._readers:
             world = self.world
             self.devices = devices_of(self.site, world, scenario, self._values, addresses, self._network)
-            self.drivers = Drivers(on_pads(sections, drawn.field["drones"]), self._bus, self.said)
+            self.drivers = Drivers(placed(sections, drawn.field), self._bus, self.said)
         self.orders = TeamOrders(self._bus("operator"))
         self._tracker_bus = self._bus("tracker")
         section = TrackerSection(field, epoch=1)

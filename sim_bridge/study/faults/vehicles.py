@@ -104,12 +104,15 @@ def of_team(sections: Iterable[Section], drones: Mapping[str, Any]) -> list[Sect
     return kept
 
 
-def on_pads(sections: Iterable[Section], drones: Mapping[str, Mapping[str, Any]]) -> list[Section]:
-    """Return the sections with the pads of these drones (plain values), which drivers check before a start."""
-    return [(kind, json.dumps(_on_pads(json.loads(section), drones))) for kind, section in sections]
+def placed(sections: Iterable[Section], field: Mapping[str, Any]) -> list[Section]:
+    """Return the sections with the pads and the fence of a field (plain values), which drivers keep to."""
+    return [(kind, json.dumps(_placed(json.loads(section), field))) for kind, section in sections]
 
 
-def _on_pads(section: dict[str, Any], drones: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def _placed(section: dict[str, Any], field: Mapping[str, Any]) -> dict[str, Any]:
+    drones, fence = field["drones"], field["room"]["fence"]
+    if "safety" in section:
+        section["safety"]["fence_m"] = [fence[axis] for axis in ("x_m", "y_m", "z_m")]
     for vehicle in section.get("vehicles") or [section]:
         if (drone := drones.get(vehicle["name"])) is None:
             continue  # sensors of the team, or a target's odometry

@@ -1,0 +1,68 @@
+"""Whether a flying vehicle has left the field's fence, by the tracker's estimate of it. Pure.
+
+The bottom is not judged: every flight begins and ends there.
+"""
+
+import math
+from typing import NamedTuple
+
+from groundstation.bus.messages import EntityEstimate
+from groundstation.time_units import NS_PER_S
+from groundstation.vectors import Bounds
+
+# Beyond the fence by so much more than this many deviations it is outside, until it is back within the second figure.
+_SIGMAS = 2.0
+_LEAVES_M, _BACK_M = 0.1, 0.05
+# It is on its way back at this speed: a tracker brings its vehicles back at 0.2 m/s and more.
+_RETURNS_M_S = 0.1
+_FRESH_NS = 300 * NS_PER_S // 1000
+
+
+class _Side(NamedTuple):
+    """A side of the fence: how far the estimate is beyond it, surely so, and its velocity back [m, m/s]."""
+
+    beyond_m: float
+    surely_m: float
+    back_m_s: float
+    where: str
+
+
+class FenceWatch:
+    """Call `hear` with each estimate of the vehicle. fence_m: low and high along x, y, z [world]; None: there is none.
+
+    An estimate that sightings contradict, or that is old, tells nothing.
+    """
+
+    def __init__(self, fence_m: Bounds | None) -> None:
+        self._fence_m = fence_m
+        self._heard_ns: int | None = None
+        self._worst: _Side | None = None
+
+    def hear(self, now_ns: int, entity: EntityEstimate) -> None:
+        """Take the tracker's estimate."""
+        if self._fence_m is None or len(entity.covariance) != 16 or len(entity.velocity_m_s) < 3 or entity.contradicted:
+            return
+        worst = max(_sides(self._fence_m, entity), key=lambda side: side.surely_m)
+        leaves = worst.surely_m > _LEAVES_M or (self._worst is not None and worst.beyond_m > _BACK_M)
+        self._heard_ns, self._worst = now_ns, worst if leaves else None
+
+    def outside(self, now_ns: int, returning_counts: bool) -> str:
+        """Return how far it is outside, in words, or ""; returning_counts: even while it is on its way back."""
+        worst = self._worst
+        if worst is None or self._heard_ns is None or now_ns - self._heard_ns > _FRESH_NS:
+            return ""
+        if worst.back_m_s >= _RETURNS_M_S and not returning_counts:
+            return ""
+        return f"it is {worst.beyond_m:.1f} m {worst.where}"
+
+
+def _sides(fence_m: Bounds, entity: EntityEstimate) -> list[_Side]:
+    sides = []
+    for axis, (low, high) in enumerate(fence_m):
+        place, velocity = entity.mean[axis], entity.velocity_m_s[axis]
+        doubt_m = _SIGMAS * math.sqrt(max(0.0, entity.covariance[5 * axis]))
+        where = "above the fence" if axis == 2 else "outside the fence"
+        sides.append(_Side(place - high, place - high - doubt_m, -velocity, where))
+        if axis != 2:
+            sides.append(_Side(low - place, low - place - doubt_m, velocity, where))
+    return sides

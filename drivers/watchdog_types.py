@@ -105,7 +105,7 @@ class WatchdogLimits:
     min_separation_m: float = 0.6
     fence_m: Bounds | None = None
     outside_hover_s: float = 1.0
-    flown_outside_s: float = 0.3
+    flown_outside_s: float = 0.5
 
     @property
     def tolerated_speed_m_s(self) -> float:

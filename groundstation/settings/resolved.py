@@ -89,5 +89,6 @@ def _safety_lines(field: Field) -> list[str]:
         f" for {safety.land_after_s:g} s: land (until a new take-off)",
         f"not localised for {safety.unseen_land_after_s:g} s, or unseen for three times as long: land;"
         f" position known worse than {safety.max_position_std_m:g} m: hover",
-        f"drones stay {safety.min_separation_m:g} m apart and inside the fence",
+        f"drones stay {safety.min_separation_m:g} m apart and inside the fence: one that leaves it hovers, and lands"
+        f" after {safety.land_after_s:g} s",
     ]

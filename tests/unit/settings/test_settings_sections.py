@@ -1,17 +1,21 @@
 """Sections of the processes; simulation changes addresses only."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.camera.settings import CameraDriverSettings
+from groundstation.field.room import Fence
 from groundstation.settings.behaviour import SafetySettings
 from groundstation.settings.drones import LimitSettings
 from groundstation.settings.load import load_field
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import CAMERA, core_section, driver_sections, rerouted
+from groundstation.vehicles import kind_named
+from sim_bridge.conformance.subject import subject_of
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
 CONFIG = Path(__file__).parents[3] / "config"
@@ -77,12 +81,22 @@ def test_every_limit_reaches_every_driver() -> None:
         if section.kind == CAMERA:
             continue
         settings = json.loads(section.section)
+        assert settings["safety"].pop("fence_m") == list(field.room.fence.model_dump(mode="json").values())
         assert settings["safety"].items() <= SILENCE.model_dump().items()
         if section.kind == "ardrone":
             assert settings["limits"] == LIMITS.model_dump()
         else:
             assert [one["limits"] for one in settings["vehicles"]] == [LIMITS.model_dump(exclude={"max_tilt_deg"})]
     assert {section.kind for section in sections} == {"ardrone", "mavlink", "camera"}
+
+
+@pytest.mark.parametrize("kind", ["ardrone", "mavlink", "tello", "ros2"])
+def test_every_kind_knows_the_fence(kind: str) -> None:
+    """A driver without one would not stop a vehicle that leaves it."""
+    fence = Fence(x_m=(-2.0, 3.0), y_m=(-1.0, 1.5), z_m=(0.0, 2.2))
+    order = replace(subject_of(kind).order(), fence=fence)
+    (process,) = kind_named(kind).processes([order])
+    assert json.loads(process.section)["safety"]["fence_m"] == [[-2.0, 3.0], [-1.0, 1.5], [0.0, 2.2]]
 
 
 def test_neighbours_do_not_hear_each_other_s_ultrasound(field: Field) -> None:

@@ -42,16 +42,18 @@ def places_of(path):
 
 
 class Pilot:
-    """The driver and the tracker's part; turn() runs one cycle of both."""
+    """The driver and the tracker's part; turn() runs one cycle of both. fence_m: bounds along x, y, z, if any."""
 
-    def __init__(self, port: int, kind: str, where, flavours=FLAVOURS, **vehicle) -> None:
+    def __init__(self, port: int, kind: str, where, flavours=FLAVOURS, fence_m=None, **vehicle) -> None:
         exchange, self.orders, self.where = MemoryExchange(), 0, where
         self.places: dict[str, deque] = {}
         self.bus = MemoryBus(exchange, "lab", "tracker")
         self.process = FakeProcess(MemoryBus(exchange, "lab", "mavlink"))
         vehicles = [{"name": f"v{s}", "system_id": s, "flavour": f, **vehicle} for s, f in flavours.items()]
         link = {"target": f"udpin:127.0.0.1:{port}", "kind": kind}
-        settings = MavlinkDriverSettings.model_validate({"link": link, "vehicles": vehicles})
+        settings = MavlinkDriverSettings.model_validate(
+            {"link": link, "vehicles": vehicles, "safety": {"fence_m": fence_m}}
+        )
         self.fleet = Fleet(self.process, settings)
         self.hosts = hosts_of(self.process, self.fleet, settings)
 

@@ -117,9 +117,9 @@ def set_up(flavour, port):
 class Flight:
     """One vehicle under our driver, on its true position; `with` closes the driver. Takes off on entry."""
 
-    def __init__(self, port, kind, flavour, truth, patience_s):
+    def __init__(self, port, kind, flavour, truth, patience_s, **options):
         self.truth, (self.pad, yaw) = truth, truth()
-        options = {"pad_m": self.pad[:2], "pad_yaw_rad": yaw}
+        options |= {"pad_m": self.pad[:2], "pad_yaw_rad": yaw}
         self.pilot = Pilot(port, kind, lambda vehicle: truth(), {SYSTEM: flavour}, **options)
         self.vehicle, self.watchdog = self.pilot.fleet.vehicles[SYSTEM], self.pilot.hosts[0].watchdog
         self._turns, self._patience_s = iter(range(10**9)), patience_s
@@ -219,6 +219,27 @@ def test_real_firmware_that_a_pilot_stops_is_taken_back_by_resume(flavour, tmp_p
             assert flight.watchdog.mode == "TRACK", flight.watchdog.reason
             assert flight.obeys and flight.height_m > 0.5
         flight.land()
+
+
+@pytest.mark.firmware
+def test_a_real_px4_that_another_station_sends_up_slowly_is_landed_above_the_fence(tmp_path):
+    """At 0.5 m/s, below every limit of speed."""
+    fence = ((-30.0, 30.0), (-30.0, 30.0), (0.0, 2.0))
+    with (
+        known("px4", tmp_path) as (firmware, truth),
+        Flight(firmware.port, "pymavlink", "px4", lambda: truth.place, patience_s=90, fence_m=fence) as flight,
+    ):
+        flight.go_on(2.0)
+        truth.send(dialect.MAVLink_param_set_message(SYSTEM, 1, b"MPC_Z_V_AUTO_UP", 0.5, 9))
+        flight.go_on(1.0)
+        here = (math.nan,) * 3
+        truth.command(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, *here, 6.0)
+        flight.until(lambda: flight.watchdog.mode == "LANDING", 15)
+        assert flight.watchdog.reason.endswith("above the fence, not by our orders")
+        landed_m, highest = flight.height_m, []
+        flight.until(lambda: highest.append(flight.height_m) or flight.watchdog.mode == "LANDED", 40)
+        print(f"landed at {landed_m:.2f} m, highest {max(highest):.2f} m")
+        assert 2.0 < landed_m < 2.6 and max(highest) < 3.0
 
 
 @pytest.mark.firmware

@@ -7,7 +7,7 @@ import math
 from typing import NamedTuple
 
 from groundstation.bus.messages import EntityEstimate
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS
 from groundstation.vectors import Bounds
 
 # Beyond the fence by so much more than this many deviations it is outside, until it is back within the second figure.
@@ -15,7 +15,7 @@ _SIGMAS = 2.0
 _LEAVES_M, _BACK_M = 0.1, 0.05
 # It is on its way back at this speed: a tracker brings its vehicles back at 0.2 m/s and more.
 _RETURNS_M_S = 0.1
-_FRESH_NS = 300 * NS_PER_S // 1000
+_FRESH_NS = 300 * NS_PER_MS
 
 
 class _Side(NamedTuple):
@@ -36,24 +36,27 @@ class FenceWatch:
     def __init__(self, fence_m: Bounds | None) -> None:
         self._fence_m = fence_m
         self._heard_ns: int | None = None
-        self._worst: _Side | None = None
+        self._left: dict[int, _Side] = {}
 
     def hear(self, now_ns: int, entity: EntityEstimate) -> None:
         """Take the tracker's estimate."""
         if self._fence_m is None or len(entity.covariance) != 16 or len(entity.velocity_m_s) < 3 or entity.contradicted:
             return
-        worst = max(_sides(self._fence_m, entity), key=lambda side: side.surely_m)
-        leaves = worst.surely_m > _LEAVES_M or (self._worst is not None and worst.beyond_m > _BACK_M)
-        self._heard_ns, self._worst = now_ns, worst if leaves else None
+        sides = enumerate(_sides(self._fence_m, entity))
+        before, self._heard_ns = self._left, now_ns
+        self._left = {
+            which: side
+            for which, side in sides
+            if side.surely_m > _LEAVES_M or (which in before and side.beyond_m > _BACK_M)
+        }
 
     def outside(self, now_ns: int, returning_counts: bool) -> str:
         """Return how far it is outside, in words, or ""; returning_counts: even while it is on its way back."""
-        worst = self._worst
-        if worst is None or self._heard_ns is None or now_ns - self._heard_ns > _FRESH_NS:
+        if self._heard_ns is None or now_ns - self._heard_ns > _FRESH_NS:
             return ""
-        if worst.back_m_s >= _RETURNS_M_S and not returning_counts:
-            return ""
-        return f"it is {worst.beyond_m:.1f} m {worst.where}"
+        left = (side for side in self._left.values() if returning_counts or side.back_m_s < _RETURNS_M_S)
+        worst = max(left, key=lambda side: side.beyond_m, default=None)
+        return "" if worst is None else f"it is {worst.beyond_m:.1f} m {worst.where}"
 
 
 def _sides(fence_m: Bounds, entity: EntityEstimate) -> list[_Side]:

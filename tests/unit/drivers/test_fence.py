@@ -68,10 +68,17 @@ def test_the_deviation_along_the_axis_counts(axis):
     ],
 )
 def test_one_on_its_way_back_is_left_alone_unless_others_fly_it(place, back):
-    for speed_m_s, told in ((0.11, False), (0.09, True), (0.0, True), (-0.3, True)):
+    for speed_m_s, told in ((0.11, False), (0.1, False), (0.09, True), (0.0, True), (-0.3, True)):
         velocity = tuple(speed_m_s * part for part in back)
-        assert bool(words(place, velocity)) is told
+        assert (words(place, velocity) != "") is told
         assert words(place, velocity, returning_counts=True)
+
+
+def test_one_that_comes_back_through_one_side_and_not_through_another_is_told():
+    place, back = (3.9, 0.0, 2.8), (-0.3, 0.0, 0.0)
+    assert words(place, back) == "it is 0.3 m above the fence"
+    assert words(place, back, returning_counts=True) == "it is 0.9 m outside the fence"
+    assert words(place, (-0.3, 0.0, -0.3)) == ""
 
 
 def test_it_stays_outside_until_it_is_back_within_half_of_the_margin():
@@ -93,8 +100,15 @@ def test_one_that_went_out_unseen_stays_outside_while_its_place_becomes_less_sur
 def test_an_old_estimate_tells_nothing():
     watch = FenceWatch(FENCE)
     assert not watch.outside(0, False)
-    watch.hear(0, estimate((4.0, 0.0, 1.2)))
-    assert watch.outside(300 * MS, False) and not watch.outside(301 * MS, False)
+    watch.hear(1000 * MS, estimate((4.0, 0.0, 1.2)))
+    assert watch.outside(1300 * MS, False) and watch.outside(1301 * MS, False) == ""
+
+
+def test_a_variance_that_rounding_made_negative_is_none():
+    said = estimate((3.2, 0.0, 1.2))
+    watch = FenceWatch(FENCE)
+    watch.hear(0, msgspec.structs.replace(said, covariance=(-1e-18, *said.covariance[1:])))
+    assert watch.outside(0, False)
 
 
 def test_an_estimate_that_sightings_contradict_tells_nothing():

@@ -68,6 +68,7 @@ class Flight:
         self.dog, self.now_ns, self.number = Watchdog(WatchdogLimits(), "clock"), 100 * S, 0
         self.vehicle = Vehicle(rng, clears=rng.random() < 0.5)
         self.epoch, self.speaks, self.stray, self.upstream = 1, True, "", Upstream()
+        self.outside = ""
 
     def _header(self) -> Header:
         self.number += 1
@@ -82,7 +83,7 @@ class Flight:
                 epoch=self.epoch, converged=True,
             )  # fmt: skip
             self.dog.accept_setpoint(self.now_ns, setpoint)
-        view = self.vehicle.view._replace(stray=self.stray)
+        view = self.vehicle.view._replace(stray=self.stray, outside=self.outside)
         decision = self.dog.step(self.now_ns, view, self.upstream)
         self.vehicle.obey(self.now_ns, decision.action)
 
@@ -110,10 +111,12 @@ class Flight:
             self.upstream = Upstream(supervisor_fresh=not self.upstream.supervisor_fresh)
         elif what < 0.43:
             self.now_ns += S  # the driver stands still
+        elif what < 0.45:
+            self.outside = "" if self.outside else "it is 0.4 m outside the fence"
 
     def settle(self, seconds: float) -> None:
         self.vehicle.silent = self.vehicle.unreached = False
-        self.stray, self.upstream = "", Upstream()
+        self.stray, self.outside, self.upstream = "", "", Upstream()
         for _ in range(round(seconds * S / LATER)):
             self.turn(LATER)
 

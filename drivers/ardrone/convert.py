@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
-from drivers.ardrone.wire.options import ALTITUDE, DEMO, PHYS_MEASURES, TIME, Demo, PhysMeasures
+from drivers.ardrone.wire.options import ALTITUDE, PHYS_MEASURES, TIME, Demo, PhysMeasures
 from drivers.ardrone.wire.state import FLYING_NO_VISION, ControlState, StateBit, join_control_state
 from drivers.plausibility.motion import MotionSample
 from groundstation.bus.messages import FlightState, Vector3
@@ -59,15 +59,6 @@ class NavdataMotion(NamedTuple):
     rates_rad_s: Vector3 | None
     specific_force_m_s2: Vector3 | None
     flies: bool = False
-
-
-def motion_from_navdata(packet: Navdata) -> NavdataMotion | None:
-    """Return the motion in a packet, or None if it carries no DEMO option (a status packet).
-
-    Raises WireError (not_finite, implausible, option_size).
-    """
-    demo = packet.read(DEMO)
-    return None if demo is None else motion_from_demo(packet, demo)
 
 
 def motion_from_demo(packet: Navdata, demo: Demo) -> NavdataMotion:

@@ -217,7 +217,7 @@ class Supervisor:
             if self._last_words.end(process.spec.name):
                 self.events.event(Severity.INFO, process, "is back in control of its drone")
             return
-        self._speak_for(process, f"silent for {heard_s:.2f} s", now_ns)
+        self._speak_for(process, f"silent for {heard_s:.2f} s")
         late_s = process.spec.hang_limit_s
         late = heard_s >= late_s
         # A new one would wait for a core as well. A driver must not come back and contradict its substitute.
@@ -232,7 +232,7 @@ class Supervisor:
             text = "gets no core of the processor: this computer is too busy"
             self.events.event(Severity.ERROR, process, text, "close other programs on it, or land")
 
-    def _speak_for(self, process: ManagedProcess, why: str, now_ns: int) -> None:
+    def _speak_for(self, process: ManagedProcess, why: str) -> None:
         words = process.spec.failsafe_datagrams
         if words is None or self._stopping or not process.silent_since_ns:  # its work is done, or never began
             return
@@ -249,7 +249,7 @@ class Supervisor:
         if self._stopping:
             return
         why = process.end_text(code, self._launcher.last_words)
-        self._speak_for(process, why, now_ns)
+        self._speak_for(process, why)
         never_up = not process.ready_ns and process.life == 1
         if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):
             self.fail(process, why)

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.commands import orders_from_decision
-from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navdata, sample_from_motion
+from drivers.ardrone.convert import flight_state_from_navdata, motion_from_demo, sample_from_motion
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.driver import LIMITS, RATE_HZ
 from drivers.ardrone.session import ArdroneSession
@@ -88,9 +88,8 @@ class Flight:
             datagram = self.writer.full(state, self.onboard, self.ticks, self.listener.next_sequence())
         control.session.sent()
         self.packet = navdata.decode(bytes(datagram))
-        motion, demo = motion_from_navdata(self.packet), self.packet.read(DEMO)
-        if motion is not None and demo is not None:
-            motion = self.lie(motion)
+        if (demo := self.packet.read(DEMO)) is not None:
+            motion = self.lie(motion_from_demo(self.packet, demo))
             self.motion.add(motion)
             self.flight_state = flight_state_from_navdata(self.packet.state, demo.control_state)
             sample = sample_from_motion(now_ns, self.packet, motion)

@@ -127,11 +127,6 @@ def pcmd(motion: ProgressiveMotion) -> AtCommand:
     return AtCommand("PCMD", (motion.flags, *(_fraction(value) for value in motion[1:5])))
 
 
-def pcmd_mag(motion: ProgressiveMotion) -> AtCommand:
-    """Move relative to the magnetic heading psi (AR.Drone 2)."""
-    return AtCommand("PCMD_MAG", (motion.flags, *(_fraction(value) for value in motion[1:])))
-
-
 def _fraction(value: float) -> int:
     clamped = value if -1.0 <= value <= 1.0 or value != value else math.copysign(1.0, value)
     return bits_from_float(clamped + 0.0)  # minus zero would be printed as -2147483648
@@ -140,11 +135,6 @@ def _fraction(value: float) -> int:
 def ftrim() -> AtCommand:
     """Take the present attitude as level; only while landed."""
     return AtCommand("FTRIM")
-
-
-def calib(device: int = 0) -> AtCommand:
-    """Calibrate the magnetometer by turning on the spot; only in flight."""
-    return AtCommand("CALIB", (device,))
 
 
 def config(key: str, value: str) -> AtCommand:
@@ -170,26 +160,6 @@ def comwdg() -> AtCommand:
 def led(animation: int, frequency_hz: float, duration_s: int) -> AtCommand:
     """Blink the LEDs."""
     return AtCommand("LED", (animation, bits_from_float(frequency_hz), duration_s))
-
-
-def anim(animation: int, duration_ms: int) -> AtCommand:
-    """Start a flight animation."""
-    return AtCommand("ANIM", (animation, duration_ms))
-
-
-def mtrim(pitch: float, roll: float, yaw: float) -> AtCommand:
-    """Trim by hand; only with `control:manual_trim`."""
-    return AtCommand("MTRIM", (bits_from_float(pitch), bits_from_float(roll), bits_from_float(yaw)))
-
-
-def pmode(mode: int) -> AtCommand:
-    """Send the first command of Parrot's programs; its meaning is not documented."""
-    return AtCommand("PMODE", (mode,))
-
-
-def misc(*values: int) -> AtCommand:
-    """Send the four numbers that Parrot's programs send second; their meaning is not documented."""
-    return AtCommand("MISC", values)
 
 
 def encode(command: AtCommand, sequence: int) -> bytes:

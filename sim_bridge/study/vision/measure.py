@@ -171,7 +171,7 @@ def _judge(tally: DetectionTally, shot: TestPicture, find: Find, attitude: tuple
     turn = _rotation_vector(best.rotation @ shot.truth.rotation.T)
     if float(np.linalg.norm(turn)) > math.radians(10.0):
         # The other planar solution, or a board so small that this is within its covariance.
-        tally.flips += _is_flip(turn, best, shot)
+        tally.flips += _is_flip(turn, best)
     covariance = pose.pose_covariance(best, points(), FRONT, _DETECTOR.corner_floor_px)
     error = np.concatenate((turn, gap))
     tally.nees_6.append(float(error @ np.linalg.solve(covariance, error)) / 6.0)
@@ -185,7 +185,7 @@ def _judge(tally: DetectionTally, shot: TestPicture, find: Find, attitude: tuple
     tally.heading_deg.append(abs(math.degrees(heading)))
 
 
-def _is_flip(turn: Array, best: pose.PlanarPose, shot: TestPicture) -> bool:
+def _is_flip(turn: Array, best: pose.PlanarPose) -> bool:
     spread = pose.pose_covariance(best, points(), FRONT, _DETECTOR.corner_floor_px)[:3, :3]
     return float(turn @ np.linalg.solve(spread, turn)) > 30.0
 

@@ -10,7 +10,7 @@ from drivers.ardrone.convert import (
     NavdataMotion,
     charge_from_demo,
     flight_state_from_navdata,
-    motion_from_navdata,
+    motion_from_demo,
     says_no_vision,
 )
 from drivers.ardrone.desired_config import Scale
@@ -37,10 +37,9 @@ def packet(state=FLY, altitude=None, phys=None, **demo):
     return Navdata(state, 1, 0, tuple(payloads))
 
 
-def motion(**demo):
-    result = motion_from_navdata(packet(**demo))
-    assert result is not None
-    return result
+def motion(**values):
+    sent = packet(**values)
+    return motion_from_demo(sent, sent.read(options.DEMO))
 
 
 def test_velocity_forward_right_becomes_forward_left():
@@ -48,8 +47,8 @@ def test_velocity_forward_right_becomes_forward_left():
 
 
 def test_climb_comes_from_the_altitude_option():
-    result = motion_from_navdata(packet(altitude=options.Altitude(vz_mm_s=250.0), vz_mm_s=-999.0))
-    assert result is not None and result.velocity_m_s[2] == pytest.approx(0.25)
+    result = motion(altitude=options.Altitude(vz_mm_s=250.0), vz_mm_s=-999.0)
+    assert result.velocity_m_s[2] == pytest.approx(0.25)
     assert motion(vz_mm_s=-120.0).velocity_m_s[2] == pytest.approx(0.12), "demo mode: body z points down"
 
 
@@ -72,19 +71,13 @@ def test_height_is_unknown_on_the_ground_and_until_it_is_measured():
 
 
 def test_a_drone_at_rest_feels_gravity_upwards():
-    result = motion_from_navdata(packet(phys=options.PhysMeasures(accelerations_mg=(100.0, 50.0, -1000.0))))
-    assert result is not None
+    result = motion(phys=options.PhysMeasures(accelerations_mg=(100.0, 50.0, -1000.0)))
     assert result.specific_force_m_s2 == pytest.approx((0.980665, -0.4903325, 9.80665))
 
 
 def test_rates_turn_with_the_axes():
-    result = motion_from_navdata(packet(phys=options.PhysMeasures(rates_deg_s=(10.0, 20.0, 30.0))))
-    assert result is not None and result.rates_rad_s is not None
+    result = motion(phys=options.PhysMeasures(rates_deg_s=(10.0, 20.0, 30.0)))
     assert [math.degrees(rate) for rate in result.rates_rad_s] == pytest.approx([10, -20, -30])
-
-
-def test_a_status_packet_has_no_motion():
-    assert motion_from_navdata(Navdata(FLY, 1)) is None
 
 
 @pytest.mark.parametrize("field", ["theta_mdeg", "phi_mdeg", "psi_mdeg", "vx_mm_s", "vy_mm_s", "vz_mm_s"])
@@ -103,9 +96,9 @@ def test_non_finite_imu_and_climb_are_refused():
         options.PhysMeasures(accelerations_mg=(math.inf, 0.0, 0.0)),
     ):
         with pytest.raises(WireError):
-            motion_from_navdata(packet(phys=bad))
+            motion(phys=bad)
     with pytest.raises(WireError):
-        motion_from_navdata(packet(altitude=options.Altitude(vz_mm_s=math.nan)))
+        motion(altitude=options.Altitude(vz_mm_s=math.nan))
 
 
 def test_implausible_rates_accelerations_and_heights_are_refused():
@@ -114,7 +107,7 @@ def test_implausible_rates_accelerations_and_heights_are_refused():
         options.PhysMeasures(accelerations_mg=(-3e38, 0.0, 0.0)),
     ):
         with pytest.raises(WireError, match="implausible"):
-            motion_from_navdata(packet(phys=bad))
+            motion(phys=bad)
     with pytest.raises(WireError, match="implausible"):
         motion(altitude_mm=2**31 - 1)
 

@@ -17,7 +17,7 @@ _FRESH_NS = 300 * NS_PER_MS
 
 
 def _place_ns(now_ns: int, entity: EntityEstimate) -> int | None:
-    """Return when a vehicle was where the estimate has it, None if that is too uncertain."""
+    """Return the time at which a vehicle was where the estimate has it; None if that place is too uncertain."""
     worst = max(entity.covariance[0], entity.covariance[5]) if len(entity.covariance) == 16 else math.inf
     if entity.age_s <= _SEEN_AGE_S and worst <= MOST_STD_M**2:
         return now_ns

@@ -136,7 +136,7 @@ class DetectorSettings(_Section):
     """Figures of the detector; the defaults are measured (reference: vision).
 
     corner_floor_px: least standard deviation assumed of a corner; tracked_search_rate_hz: full searches while every
-    expected marker is tracked; sought_search_rate_hz: while something is not in view that is sought (a target that no
+    expected marker is tracked; sought_search_rate_hz: while something that is sought is out of view (a target that no
     camera sees, a robot that a fixed one should); search_share: the share of a processor's time that those may take;
     ambiguity_cost: cost difference (chi-square units) below which both poses are reported.
     """

@@ -1,7 +1,7 @@
 """Compares an autopilot's heading in flight with the tracker's, which cameras correct. Pure.
 
-The autopilot gets its heading from our poses. One that is off turns every velocity by the same angle: that which is
-commanded in its heading, or that which it reports. Corrections then turn too, and swing up within seconds.
+The autopilot gets its heading from our poses. If its heading is off, every velocity is turned by the same angle,
+whether commanded in that heading or reported by the vehicle. Corrections then turn too, and swing up within seconds.
 """
 
 import math

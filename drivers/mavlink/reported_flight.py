@@ -83,7 +83,7 @@ class ReportedFlight:
         return why, self.mute(now_ns, known, slow)
 
     def failsafe(self, known: LatestTelemetry) -> str:
-        """Return that its autopilot is in a failsafe, with its mode, when that begins while its motors turn, or "".
+        """Return words for a failsafe of the autopilot when it begins while the motors turn; otherwise "".
 
         WIRE (docs/reference/mavlink.md 5.2): its text about it comes once, and radios lose texts.
         """
@@ -99,7 +99,7 @@ class ReportedFlight:
         return moves
 
     def must_keep_limits(self, now_ns: int) -> bool:
-        """Return whether its speed is limited though our setpoints do not move it: nor do a pilot's, nor just now."""
+        """Return whether its speed is limited when our setpoints do not move it: no pilot does or just did."""
         stops = self._piloted_ns is not None and now_ns - self._piloted_ns < _STOPS_NS
         return not (stops or self._orders.climbs_by_itself(now_ns))
 

@@ -157,7 +157,8 @@ def _cost(row: Mapping[str, Any]) -> float:
 def targets(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return {name: {"limit", "value", "met"}} for 30 robots; nothing when they were not run.
 
-    Kernels and `path` with minimal blocks; `path_as_flown` with the product's, in order, without and with heights.
+    Kernels and the path with minimal blocks; `path_as_flown_us` and `path_as_flown_heights_us` with the product's, in
+    order, without and with heights.
     """
     kernels = {row["method"]: row for row in result["kernels"] if _is_judged(row, "minimal")}
     paths = [row for row in result["path"] if _is_judged(row, "minimal")]

@@ -85,8 +85,8 @@ class Handle:
     def _buttons(self, man: DeadMan, data: bytes, now_ns: int) -> tuple[Verb | None, bool]:
         asked: Verb | None = None
         for _, value, kind, number in _EVENT.iter_unpack(data[: len(data) // _EVENT.size * _EVENT.size]):
-            # The present state is told when the device is opened, where a button that is down was not pressed for us,
-            # and instead of events that were lost because more than 64 waited: a release or LAND may be among them.
+            # The present state comes when the device is opened (a button that is down then was not pressed for us), and
+            # in place of events that were lost because more than 64 waited (a release or LAND may be among them).
             told = bool(kind & _PRESENT)
             if kind & ~_PRESENT != _BUTTON:
                 continue

@@ -49,7 +49,7 @@ class EventLog:
         self._look()
 
     def add(self, stamp_ns: int, tie: str, values: Sequence[float]) -> int:
-        """Insert an event from its first values (`event_values`); returns its row."""
+        """Insert an event from its first values (of `observation_values` or `change_values`); returns its row."""
         if not self._free:
             self._grow()
         row = self._free.pop()

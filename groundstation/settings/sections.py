@@ -55,11 +55,12 @@ def rerouted(
 ) -> Field:
     """Return the same field with other addresses of drones and other sources of sensors, by name.
 
-    addresses: drone -> address. streams: world-fixed camera, or drone for the camera that it carries -> (address,
-    port), spoken to as the field's own source is where that is the vehicle's own video, else by HTTP. captures: motion
-    capture or ranging system, or odometry of a target -> (address, port), spoken to by NatNet, as a gateway of ranges,
-    or as a router of ROS 2 where its source is one. This, and that a drone may have any serial number, is all that
-    simulation changes.
+    addresses: drone -> address.
+    streams: world-fixed camera, or drone for the camera that it carries -> (address, port). A camera whose source is
+    the vehicle's own video keeps that protocol; all others are read by HTTP.
+    captures: motion capture or ranging system, or odometry of a target -> (address, port). The protocol is NatNet, that
+    of a gateway of ranges, or that of a router of ROS 2 if the source in the field is one.
+    These addresses, and that a drone may have any serial number, are all that simulation changes.
     streams_only: drones whose cameras are never their own video. Raises KeyError for a name that is not in the field.
     """
     heard = [*map(odometry_name, field.tracked)]

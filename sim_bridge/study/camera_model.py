@@ -29,9 +29,9 @@ from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import World
 
 _BORDER_PX = 6.0
-# Pixels per square that the detector needs in a window about the last sighting or the belief; in a search of the whole
-# picture: of a camera that stands, a large picture of one, which is halved first (docs/reference/vision.md 8), and of a
-# camera that a searching robot turns.
+# Pixels per square that the detector needs (docs/reference/vision.md 8): in a window about the last sighting or the
+# belief; in a search of the whole picture of a camera that stands; in that of a large picture, which is halved first;
+# and in that of a camera that a searching robot turns.
 _WINDOW_PX, _STANDING_PX, _HALVED_PX, _TURNING_PX = 5.5, 5.5, 6.7, 8.5
 _FORGET_S = 0.4
 _STEEPEST_COS = math.cos(math.radians(72.0))

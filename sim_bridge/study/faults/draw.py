@@ -15,7 +15,7 @@ from sim_bridge.world.noise import generator_of
 
 _HEALTHY_SHARE = 0.1
 # Pads lie where the ceiling camera of the shipped fields sees a drone at the height to which it takes off, and far
-# enough inside the fence that a take-off does not leave it (as `groundstation check` advises).
+# enough inside the fence that a take-off does not leave it (as `groundstation config check` advises).
 _PADS_M = (1.4, 0.75)
 PAD_TO_OBSTACLE_M = 0.6
 _LEAST_PADS_M, _TARGET_M, _PAD_TO_FENCE_M = 1.1, 0.6, 0.3

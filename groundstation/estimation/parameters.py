@@ -93,38 +93,47 @@ class EstimatorParameters:
 def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
     """Return the parameters for a resolved field."""
     drones, estimator = resolved.drones, resolved.estimator
-    entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in drones.items()}
-    entities |= {name: _target(target) for name, target in resolved.tracked.items()}
-    fixed: dict[str, WorldCamera | MotionCapture] = {**resolved.cameras, **resolved.sensing_capture}
-    entities |= {name: _mount(sensor) for name, sensor in fixed.items()}
-    cameras: dict[str, ObservationModel] = {
-        name: _world_camera(name, camera) for name, camera in resolved.cameras.items()
-    }
-    cameras |= {name: _capture(name, system) for name, system in resolved.sensing_capture.items()}
-    for name, system in resolved.ranging.items():
-        for link, (anchor, drone) in _links(name, system, drones).items():
-            place_m = system.transponder(drone).position_m
-            entities[link] = Anchor(system.anchors[anchor], system.bias_std_m)
-            cameras[link] = RangeSensor(link, place_m, system.reach_m, RANGE_STAMP_STD_S)
-    cameras |= {name: _onboard_camera(name, drone.camera) for name, drone in drones.items()}
-    reporting = frozenset(name for name, target in resolved.tracked.items() if target.odometry is not None)
-    cameras |= {odometry_name(name): ReportedVelocity(name) for name in resolved.tracked if name in reporting}
+    habits = {name: kind_named(drone.kind).habits for name, drone in drones.items()}
     return EstimatorParameters(
-        entities,
-        cameras,
+        _entities(resolved),
+        _sensors(resolved),
         max_lateness_s=estimator.max_lateness_s,
         wait_s=_wait_s(drones.values()),
         gate_probability=estimator.gate_probability,
-        inertial={
-            n: d.odometry.velocity_scale for n, d in drones.items() if not kind_named(d.kind).habits.tells_attitude
-        },
-        joins_early=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.flies_on_estimate),
-        tells_steps=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.tells_steps),
-        fastest_m_s={n: kind_named(d.kind).habits.fastest_m_s for n, d in drones.items()},
+        inertial={n: drones[n].odometry.velocity_scale for n, habit in habits.items() if not habit.tells_attitude},
+        joins_early=frozenset(n for n, habit in habits.items() if habit.flies_on_estimate),
+        tells_steps=frozenset(n for n, habit in habits.items() if habit.tells_steps),
+        fastest_m_s={n: habit.fastest_m_s for n, habit in habits.items()},
         world_cameras=frozenset(resolved.cameras),
         ranging={name: _ranged(system, drones) for name, system in resolved.ranging.items()},
-        reporting=reporting,
+        reporting=frozenset(name for name, target in resolved.tracked.items() if target.odometry is not None),
     )
+
+
+def _entities(resolved: ResolvedField) -> dict[str, MotionModel]:
+    """Return the models of motion in the order of the state: robots, targets, mountings, ranging links."""
+    entities: dict[str, MotionModel] = {name: _robot(drone) for name, drone in resolved.drones.items()}
+    entities |= {name: _target(target) for name, target in resolved.tracked.items()}
+    fixed: dict[str, WorldCamera | MotionCapture] = {**resolved.cameras, **resolved.sensing_capture}
+    entities |= {name: _mount(sensor) for name, sensor in fixed.items()}
+    for name, system in resolved.ranging.items():
+        for link, (anchor, _) in _links(name, system, resolved.drones).items():
+            entities[link] = Anchor(system.anchors[anchor], system.bias_std_m)
+    return entities
+
+
+def _sensors(resolved: ResolvedField) -> dict[str, ObservationModel]:
+    """Return the models of observation by the sensor's name on the bus; a camera on a drone has the drone's."""
+    sensors: dict[str, ObservationModel] = {
+        name: _world_camera(name, camera) for name, camera in resolved.cameras.items()
+    }
+    sensors |= {name: _capture(name, system) for name, system in resolved.sensing_capture.items()}
+    for name, system in resolved.ranging.items():
+        for link, (_, drone) in _links(name, system, resolved.drones).items():
+            sensors[link] = RangeSensor(link, system.transponder(drone).position_m, system.reach_m, RANGE_STAMP_STD_S)
+    sensors |= {name: _onboard_camera(name, drone.camera) for name, drone in resolved.drones.items()}
+    reporting = [name for name, target in resolved.tracked.items() if target.odometry is not None]
+    return sensors | {odometry_name(name): ReportedVelocity(name) for name in reporting}
 
 
 def _wait_s(drones: Collection[FieldDrone]) -> float:

@@ -101,9 +101,7 @@ def camera_findings(
 
     sees: the entities whose markers it sees.
     """
-    fixed = field.world_sensors
-    dark = [name for name in fixed if name not in statuses or not statuses[name].connected]
-    if len(dark) == len(fixed):
+    if not any(name in statuses and statuses[name].connected for name in field.world_sensors):
         remedy = "check power, source and network of at least one: without it nobody knows where the drones are"
         yield Finding(Level.MUST, "cameras", "no sensor fixed in the world sends anything", remedy)
     pieces = dict.fromkeys((*field.cameras, *map(camera_name, field.drones)), "pictures")
@@ -111,18 +109,23 @@ def camera_findings(
     pieces |= dict.fromkeys(field.reporting, "reports")
     for name, what in pieces.items():
         status = statuses.get(name)
+        reports = name in field.reporting
         if status is None or not status.connected:
             why = status.detail if status is not None and status.detail else "nothing arrives"
-            alone = "; cameras track the target meanwhile" if name in field.reporting else ""
+            alone = "; cameras track the target meanwhile" if reports else ""
             yield Finding(Level.SHOULD, name, why, f"check its power, its source and its network{alone}")
-            continue
-        seen = f", sees {', '.join(sees[name])}" if sees.get(name) else ""
-        used = "used" if name in field.reporting else "sightings"
-        found = f"{status.fps:.0f} {what}/s, {status.age_ms:.0f} ms old, {status.detections} {used}{seen}"
-        good = status.fps >= _PICTURES_HZ and status.age_ms <= _PICTURES_OLD_MS
-        remedy = "" if good else "fewer or smaller pictures, a better link, or a faster machine"
-        yield Finding(Level.OK if good else Level.SHOULD, name, found, remedy)
-        yield from _picture(name, status)
+        else:
+            yield _stream(name, status, what, "used" if reports else "sightings", sees.get(name, ()))
+            yield from _picture(name, status)
+
+
+def _stream(name: str, status: CameraStatus, what: str, used: str, sees: Sequence[str]) -> Finding:
+    """Return the rate and age of a sensor's data; what, used: words for these, and for those that were used."""
+    seen = f", sees {', '.join(sees)}" if sees else ""
+    found = f"{status.fps:.0f} {what}/s, {status.age_ms:.0f} ms old, {status.detections} {used}{seen}"
+    if status.fps >= _PICTURES_HZ and status.age_ms <= _PICTURES_OLD_MS:
+        return Finding(Level.OK, name, found)
+    return Finding(Level.SHOULD, name, found, "fewer or smaller pictures, a better link, or a faster machine")
 
 
 def _picture(name: str, status: CameraStatus) -> Iterator[Finding]:

@@ -50,26 +50,29 @@ def pad_findings(
     if not field.cameras:
         return
     known = [s for s in sightings if s.drone in field.drones and s.camera in field.cameras]
-    seen, on_pads = {s.drone for s in known}, [s for s in known if s.drone not in flew]
     followed = {s.drone for s in sightings if s.camera not in field.cameras} & field.drones.keys()
-    above = set(flew).union(*pads_in_view(field).values())
-    missed = [n for n in field.drones if n not in seen and n not in aloft and (n not in followed or n in above)]
-    remedy = "check light, lens and marker, and that it stands {} in view"
+    unseen = [name for name in field.drones if name not in aloft and all(s.drone != name for s in known)]
+    in_some_view = set(flew).union(*pads_in_view(field).values())
+    missed = [name for name in unseen if name not in followed or name in in_some_view]
     if not known and not aloft:
-        if not missed:
-            return
-        shown = shown_by(drone.marker for drone in field.drones.values())
-        where = remedy.format("anywhere" if set(field.drones) <= set(flew) else "on its pad")
-        level = Level.SHOULD if followed else Level.MUST
-        yield Finding(level, SUBJECT, "no fixed camera sees any drone", f"{where}; {shown}")
+        if missed:
+            level = Level.SHOULD if followed else Level.MUST
+            remedy = _remedy_for(field, field.drones, anywhere=set(field.drones) <= set(flew))
+            yield Finding(level, SUBJECT, "no fixed camera sees any drone", remedy)
         return
     yield from blind_cameras(field, known, flew)
     for name in missed:
-        shown, where = shown_by([field.drones[name].marker]), "anywhere" if name in flew else "on its pad"
-        told = f"{remedy.format(where)}; {shown}"
-        yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", told)
-    if on_pads:
+        remedy = _remedy_for(field, [name], anywhere=name in flew)
+        yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", remedy)
+    if on_pads := [s for s in known if s.drone not in flew]:
         yield finding(field, opinion(stand_of(field), on_pads))
+
+
+def _remedy_for(field: ResolvedField, drones: Iterable[str], *, anywhere: bool) -> str:
+    """Return the remedy for unseen drones; anywhere: they have flown, and need not stand on their pads any more."""
+    where = "anywhere" if anywhere else "on its pad"
+    shown = shown_by(field.drones[name].marker for name in drones)
+    return f"check light, lens and marker, and that it stands {where} in view; {shown}"
 
 
 def open_musts(findings: Iterable[Finding], wanted: Collection[str], team: Collection[str]) -> list[Finding]:

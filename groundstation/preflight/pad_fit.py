@@ -7,6 +7,7 @@ suspicion is Laplace's approximation: how well it explains the sightings, less a
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -55,18 +56,16 @@ class PadFit:
 
     def __init__(self, stand: Stand, sightings: Sequence[PadSighting]) -> None:
         self.stand, self.sightings = stand, tuple(sightings)
-        drones = dict.fromkeys(s.drone for s in self.sightings)
-        cameras = dict.fromkeys(s.camera for s in self.sightings)
+        cameras, drones = [s.camera for s in self.sightings], [s.drone for s in self.sightings]
         self.keys: tuple[Key, ...] = (
             TEAM_PRINT,
-            *((c, part) for c in cameras for part in PER_CAMERA),
-            *((d, part) for d in drones for part in PER_DRONE),
+            *product(dict.fromkeys(cameras), PER_CAMERA),
+            *product(dict.fromkeys(drones), PER_DRONE),
         )
         self._place = {key: index for index, key in enumerate(self.keys)}
-        whose = {part: [s.camera for s in self.sightings] for part in PER_CAMERA}
-        whose |= {part: [s.drone for s in self.sightings] for part in PER_DRONE}
-        self._columns = {part: [self._place[name, part] for name in names] for part, names in whose.items()}
-        seen_by = [stand.cameras[s.camera] for s in self.sightings]
+        self._columns = {part: [self._place[name, part] for name in cameras] for part in PER_CAMERA}
+        self._columns |= {part: [self._place[name, part] for name in drones] for part in PER_DRONE}
+        seen_by = [stand.cameras[name] for name in cameras]
         self._rotations = np.array([camera.rotation for camera in seen_by])
         self._positions = np.array([camera.position_m for camera in seen_by])
         self._tight = np.array([self._prior(key) for key in self.keys])

@@ -155,32 +155,44 @@ class _Rows:
     def finish(self) -> None:
         """Make the arrays; rows are sorted by time, since senders reach the recorder in no fixed order."""
         data = self._data
+        self._finish_truth()
+        self._finish_estimates()
+        self._finish_processes()
+        for name, times_ns in self._heard.items():
+            data.heard_s[name] = (np.sort(np.array(times_ns, dtype=np.int64)) - data.start_unix_ns) / 1e9
+        tenths = np.array(sorted(self._recorded), dtype=np.int64)
+        data.recorded_s = (tenths * _TENTH_NS - data.start_unix_ns) / 1e9
+        for timed in (data.commands, data.acks, data.plans, data.innovations, data.events):
+            timed.sort(key=lambda item: item.time_s)
+        for maps in data.search_maps.values():
+            maps.sort(key=lambda item: item.time_s)
+
+    def _finish_truth(self) -> None:
+        data = self._data
         for name, rows in self._truth.items():
             table = np.array(sorted(rows))
             data.truth[name] = TruthTrack(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5] > 0.5)
         if self._captured:
             system = data.resolved.motion_capture.get(data.resolved.truth["from"])
             data.truth = captured_tracks(self._captured, data.vehicles, system.rate_hz if system else 30.0)
+
+    def _finish_estimates(self) -> None:
+        data = self._data
         for name, estimates in self._estimates.items():
             data.estimates[name] = estimates.track()
         for name, numbers in self._certainties.items():
             table = np.array(numbers).reshape(-1, 4)
             table = table[np.argsort(table[:, 0], kind="stable")]
             data.certainties[name] = CertaintyTrack(table[:, 0], table[:, 1], table[:, 2], table[:, 3] > 0.5)
+
+    def _finish_processes(self) -> None:
+        data = self._data
         for name, said in self._processes.items():
             # Never both: the supervisor's status of an absent process (no pid, ticks or CPU) is no figure of it.
             table = np.array(sorted(said.get(name) or (row for rows in said.values() for row in rows)))
             data.processes[name] = ProcessTrack(table[:, 0], table[:, 1], table[:, 2:6], table[:, 6], table[:, 7])
-        for name, times_ns in self._heard.items():
-            data.heard_s[name] = (np.sort(np.array(times_ns, dtype=np.int64)) - data.start_unix_ns) / 1e9
-        tenths = np.array(sorted(self._recorded), dtype=np.int64)
-        data.recorded_s = (tenths * _TENTH_NS - data.start_unix_ns) / 1e9
         if self._sim:
             data.sim_counters = np.array(sorted(self._sim))[:, 1:]
-        for timed in (data.commands, data.acks, data.plans, data.innovations, data.events):
-            timed.sort(key=lambda item: item.time_s)
-        for maps in data.search_maps.values():
-            maps.sort(key=lambda item: item.time_s)
 
 
 class _EstimateRows:

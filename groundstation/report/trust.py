@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import msgspec
 import numpy as np
 
-from groundstation.bus.messages import Belief, Innovation, Severity, Verdict
+from groundstation.arrays import Array
+from groundstation.bus.messages import Belief, Innovation, Plan, Severity, Verdict
 from groundstation.estimation.mean_interval import half_width
 from groundstation.report.interval import tracking_interval
 from groundstation.report.tracks import RunData, TimedMessage
@@ -150,24 +151,32 @@ def _shift(camera: str, what: str, errors: Sequence[float], std: float) -> Surve
 
 
 def _links(data: RunData) -> list[LinkForecast]:
-    start_s, end_s = tracking_interval(data) or (0.0, data.end_s)
+    sighted_s = _sighting_times(data)
+    planned: defaultdict[tuple[str, str], list[tuple[float, bool]]] = defaultdict(list)
+    for plan, lasts_s in _plans(data):
+        for edge in plan.message.edges:
+            if edge.information >= _COUNTED_ON:
+                times = sighted_s.get((edge.observer, edge.subject), np.empty(0))
+                planned[edge.observer, edge.subject].append((lasts_s, _saw(times, plan.time_s)))
+    return [_link(*edge, found) for edge, found in sorted(planned.items())]
+
+
+def _sighting_times(data: RunData) -> dict[tuple[str, str], Array]:
+    """Return the sorted times [s] of all observations of each pair of observer and subject."""
     seen: defaultdict[tuple[str, str], list[float]] = defaultdict(list)
     systems = data.resolved.ranging_links  # plans count on all its anchors together
     for item in data.innovations:
         observer = systems.get(item.message.observer, item.message.observer)
         seen[observer, item.message.subject].append(item.time_s)
-    looked_at = {edge: np.sort(times) for edge, times in seen.items()}
-    planned: defaultdict[tuple[str, str], list[tuple[float, bool]]] = defaultdict(list)
+    return {edge: np.sort(times) for edge, times in seen.items()}
+
+
+def _plans(data: RunData) -> Iterator[tuple[TimedMessage[Plan], float]]:
+    """Yield the plans made while the team tracked, and how long each was flown [s]."""
+    start_s, end_s = tracking_interval(data) or (0.0, data.end_s)
     plans = [item for item in data.plans if start_s <= item.time_s < end_s]
-    until_s = [*(plan.time_s for plan in plans[1:]), end_s][: len(plans)]
-    for plan, until in zip(plans, until_s, strict=True):
-        lasts_s = min(until - plan.time_s, _PLAN_LASTS_S)
-        for edge in plan.message.edges:
-            if edge.information < _COUNTED_ON:
-                continue
-            times = looked_at.get((edge.observer, edge.subject), np.empty(0))
-            planned[edge.observer, edge.subject].append((lasts_s, _saw(times, plan.time_s)))
-    return [_link(*edge, found) for edge, found in sorted(planned.items())]
+    for plan, until_s in zip(plans, [*(plan.time_s for plan in plans[1:]), end_s], strict=False):
+        yield plan, min(until_s - plan.time_s, _PLAN_LASTS_S)
 
 
 def _saw(times: np.ndarray, now_s: float) -> bool:

@@ -4,7 +4,7 @@ The filter inflates observations beyond the gate and re-initialises entities tha
 all the same has a cause that it cannot mend: a camera that was knocked, a wrong setting, a sensor or stream that hangs.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from groundstation.bus.messages import Message, Odometry, RelativeObservation, Severity, Verdict
@@ -96,10 +96,7 @@ class ConsistencyWatch:
             for pair, edge in self._edges.items()
             if now_ns - edge.at_ns <= _SILENT_NS and edge.count >= _LEAST_SIGHTINGS
         }
-        far = {pair for pair, mean in live.items() if mean > _FAR}
-        blamed: dict[str, list[tuple[str, str]]] = {}
-        for pair in far:
-            blamed.setdefault(_culprit(pair, far, live), []).append(pair)
+        blamed = _blamed(live)
         found = []
         for name, alarm in self._alarms.items():
             own = [mean for pair, mean in live.items() if name in pair]
@@ -128,6 +125,15 @@ class ConsistencyWatch:
             else:
                 found.append(Notice(Severity.INFO, "no longer frozen", entity=name))
         return found
+
+
+def _blamed(live: Mapping[tuple[str, str], float]) -> dict[str, list[tuple[str, str]]]:
+    """Return the pairs whose mean contradicts the belief, by the entity to blame."""
+    far = {pair for pair, mean in live.items() if mean > _FAR}
+    blamed: dict[str, list[tuple[str, str]]] = {}
+    for pair in far:
+        blamed.setdefault(_culprit(pair, far, live), []).append(pair)
+    return blamed
 
 
 def _culprit(pair: tuple[str, str], far: Collection[tuple[str, str]], live: Collection[tuple[str, str]]) -> str:

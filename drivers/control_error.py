@@ -19,7 +19,7 @@ _TURNING_S = 0.5
 _LONGEST_STEP_S = 0.2
 # Residual motion after a take-off, and its climb.
 _FIRST_M_S, _FIRST_CLIMB_M_S = 0.2, 1.0
-# The fastest climb that a field allows: one that continues to its take-off height may fly it.
+# The fastest climb that a field allows: a drone that continues to its take-off height may fly it.
 _RISES_M_S = 1.5
 
 

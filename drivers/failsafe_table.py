@@ -194,7 +194,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.OUTSIDE, land, "{why}", limits.land_after_s, patience, SLOWLY),
         # Others obey no limiter of ours; no order but LAND stops what they fly.
         Failsafe(Condition.FLOWN_OUTSIDE, land, "{why}, not by our orders", limits.flown_outside_s, "", SLOWLY),
-        # A pilot has landed it, or it was pressed down: its controllers wind up until it notices its landing.
+        # A pilot has landed it, or it was pressed down: its controllers wind up until it notices that it has landed.
         Failsafe(Condition.ON_FLOOR, land, "it has come down to the floor", limits.floor_land_s, modes=FREE),
     )  # fmt: skip
 

@@ -19,7 +19,7 @@ _STEP_M_S, _BRAKES_M_S2 = 0.15, 2.1
 # A drone that has stopped wanders off again within this time, if a glitch was all.
 _STAYS_NS = 150 * NS_PER_MS
 _LONGEST_GAP_NS = 300 * NS_PER_MS
-# How long it must say that it sees nothing, and how long that outlives its last packet that does.
+# For how long a drone must report that it sees no floor, and for how long after its last such packet that counts.
 _SAYS_NS, _HOLD_NS = 200 * NS_PER_MS, NS_PER_S
 
 

@@ -181,7 +181,7 @@ class Pipeline:
     def _adopted(self, find: detect.Find, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> Track:
         """Return the track that lost this board, else a new one; its bar identifies it later.
 
-        It may be another entity's than the one that was looked for: its own prediction counts.
+        It may belong to another entity than the expected one: then that entity's prediction counts.
         """
         for track in self._tracks:
             own = self._prediction_of(track, predictions)

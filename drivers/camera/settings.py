@@ -69,9 +69,9 @@ class TagSettings(_Section):
 
 
 class MarkerSettings(_Section):
-    """A marker that may come into view: its carrier, its place on that [m; base], and its print.
+    """A marker that may come into view: its carrier, its place on the carrier [m; base], and its print.
 
-    That is a checkerboard (code, square_mm), or a tag.
+    The print is a checkerboard (code, square_mm) or a tag.
     """
 
     entity: _Name

@@ -81,7 +81,7 @@ class LatestTelemetry:
         return self.heartbeat_ns > 0 and now_ns - self.heard_ns > FRESH_NS
 
     def disarmed_aloft(self, now_ns: int, landed: int) -> bool:
-        """Return whether it recently reports both that its motors stand and that it flies (MAV_LANDED_STATE).
+        """Return whether the latest reports say both that the motors stand and that it flies (MAV_LANDED_STATE).
 
         Both cannot be true for long: the heartbeat may be old, or another vehicle's.
         """

@@ -1,7 +1,7 @@
 """Judges whether a vehicle that reports flight has left the floor, where it stood, and how far its reports count. Pure.
 
 WIRE (docs/reference/mavlink.md 2.1): PX4 reports flight up to 3.5 s before it leaves the floor. The height that cameras
-see decides; its own reports count where they do not see it, or beyond a height by which they never err.
+see decides. The vehicle's reports count where cameras do not see it, or if they exceed their largest error.
 """
 
 from drivers.mavlink.wire.names import Landed

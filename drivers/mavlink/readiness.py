@@ -53,7 +53,7 @@ class Readiness:
         self._starts_ns = (now_ns if self._starts_ns is None else self._starts_ns) if starts else None
 
     def refusal(self, known: LatestTelemetry) -> str:
-        """Return what it said last against starting its motors since it was told to take off, "" once they turn."""
+        """Return the vehicle's last objection to starting its motors since the order to take off; "" once they turn."""
         if self._starts_ns is None or known.base_mode & ARMED:
             return ""
         # WIRE (PX4 1.16): "Preflight Fail: ..." names the fault, "Arming denied: ..." only says that there is one.

@@ -18,7 +18,7 @@ _ANSWERS_NOTHING = "it is heard, but sends nothing that it is asked for: it may 
 
 
 class ReportedFlight:
-    """The flight of one vehicle; orders: those that it has, misfit: why its frames may be of no use."""
+    """The flight of one vehicle. orders: its present ones; misfit: why its frames may be unusable."""
 
     def __init__(self, flavour: Flavour, orders: Orders, misfit: Misfit) -> None:
         self._flavour, self._orders, self._misfit = flavour, orders, misfit

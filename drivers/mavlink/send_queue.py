@@ -31,7 +31,7 @@ class Waiting(NamedTuple):
 
 
 class SendQueue:
-    """The frames that wait for a line, and for how long it is busy with those that it has.
+    """The frames that wait for a line, and for how long the line is still busy with earlier ones.
 
     drop: called for each frame that is left out: replaced by a newer one of its kind, or too old.
     """

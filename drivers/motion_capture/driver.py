@@ -46,7 +46,7 @@ class MotionCaptureDriver:
         self._bodies = {body.name: body for body in settings.bodies}
         self._watch = BodyWatch(settings.max_speed_m_s)
         self._faults: dict[str, str] = {}
-        # Bodies that arrive one by one each have their own turn: the first of them must not take that of the others.
+        # Each body has a grid of its own, as bodies may arrive one by one: otherwise only the first would be published.
         self._grids = {entity: Grid(settings.rate_hz) for entity in (_NOBODY, *(one.entity for one in settings.bodies))}
         self._exposures_ns = dict.fromkeys(self._grids, 0)
         remedy = f"check the system, whether it streams, and its address {settings.source}"

@@ -149,7 +149,7 @@ class Ros2Vehicle:
 
     @property
     def _odometry(self) -> str:
-        """Return the topic of its odometry, and where it is announced the nodes that publish it."""
+        """Return words for its odometry: the topic, and the nodes that publish it as far as they are announced."""
         own = self._settings.ros2
         nodes = " and ".join(self._link.odometry_nodes)
         return f"its odometry (/{own.topic(own.odometry)}{nodes and f' of {nodes}'})"

@@ -1,4 +1,4 @@
-"""Judges whose odometry counts: that of one publisher, and in flight of no heir that does not continue it. Pure."""
+"""Judges whose odometry counts: one publisher's; in flight a successor counts only if it continues the motion. Pure."""
 
 import math
 from dataclasses import dataclass, field

@@ -21,8 +21,8 @@ def project(wanted: Array, normals: Array, most: Array) -> tuple[Array, list[int
     """Return the nearest velocity v with normals @ v <= most, and the half-spaces that limited it on the way.
 
     normals: unit rows [m, 3]. Where no velocity satisfies all, those that demand motion (most < 0) are relaxed, all by
-    the same smallest sufficient amount, but not beyond most = 0: zero satisfies all in the end. If it is enough that
-    those relax which conflict with each other, the others do not.
+    the same smallest sufficient amount, but not beyond most = 0: zero satisfies all in the end. Where it
+    is enough to relax the half-spaces that conflict with each other, only these are relaxed.
     """
     velocity, met, conflict = _nearest(wanted, normals, most)
     if velocity is not None:

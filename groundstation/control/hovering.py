@@ -86,7 +86,7 @@ class Hovering:
         return {name: self._held(name, one, now_ns, belief, seen_s) for name, one in wanted.items()}
 
     def within(self, safety: SafetyParameters) -> SafetyParameters:
-        """Return settings in which a hovering robot has the limits within which its driver moves it."""
+        """Return the settings with each hovering robot's limits replaced by those within which its driver moves it."""
         return replace(safety, limits={**safety.limits, **{name: self._limits(name, safety) for name in self._stays}})
 
     def _limits(self, name: str, safety: SafetyParameters) -> MotionLimits:

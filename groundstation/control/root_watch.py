@@ -106,7 +106,7 @@ class RootWatch:
         return self._ages_s[name]
 
     def helped_age_s(self, name: str) -> float:
-        """Return the same of sightings that reached it through others alone: they still count where no root sees it."""
+        """Return the age [s] of the newest that reached it through others: these count where no root sees it."""
         others = (at_ns for seen, at_ns in self._rooted_ns.get(name, {}).items() if seen != name)
         return self._since_s(max(others, default=None))
 

@@ -47,7 +47,7 @@ def permitted(
 def extra_ways_m(name: str, places: Array, control: ControlParameters, sensors: SensorSuite) -> Array:
     """Return how much longer a robot's ways back from stands (n, 2) are past obstacles [m].
 
-    Infinite for those that are too near to one, or from which no way is known.
+    Infinite for stands that are too near to an obstacle, or from which no way is known.
     """
     detours, height_m = control.detours, control.return_height_m
     extra_m = np.where(detours.clear_of(places, control.search_height_m), 0.0, np.inf)

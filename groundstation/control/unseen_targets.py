@@ -17,7 +17,7 @@ def unseen_words(name: str, unseen_s: float, place_m: Iterable[float]) -> str:
 
 
 class UnseenTargets:
-    """Reports once of each target that it is unseen, and once that it is seen again."""
+    """Reports each target once when it gets out of sight, and once when it is seen again."""
 
     def __init__(self) -> None:
         self._told: frozenset[str] = frozenset()

@@ -133,7 +133,7 @@ def _others(
     robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array], rest: Vector3,
     time: float,
 ) -> list[Wall]:  # fmt: skip
-    """Return two walls for each other robot: one at its point of rest, one at its place now.
+    """Return two walls for each other robot: at its point of rest, and at its present place.
 
     Half of the closing speed is this robot's share.
     """

@@ -64,7 +64,7 @@ class FixedLagFilter:
         # Steps after and before now that a measurement may fall into; a command is followed after its stamp.
         self._ahead = (FUTURE_NS + max(0, *(-d for d in delays), 0)) // self._step_ns + 2 + _IDLE_STEPS
         self._behind = (self._lag_ns + max(0, *delays, 0)) // self._step_ns + 3
-        # Steps, including the present one, whose observations wait: the step before them ended that long ago.
+        # Number of steps, with the present one, whose observations wait: all before them ended at least `wait_s` ago.
         self._wait_steps = math.ceil(parameters.wait_s / parameters.step_s) + 1 if parameters.wait_s > 0.0 else 0
         self._build_state([model.admitted for model in self._models])
 

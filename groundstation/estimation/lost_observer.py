@@ -71,9 +71,9 @@ def loosen(belief: Belief, event: EventRow, innovation: Innovation, gate: float)
 def face(
     belief: Belief, deferred: Deferred, sensor: SensorRow, event: EventRow, innovation: Innovation, insists: bool
 ) -> bool:  # fmt: skip
-    """Turn a robot of unknown heading so that what it reads lies where it reads it; True if the innovation is void.
+    """Turn a robot of unknown heading so that its subject lies in the measured bearing; True if the innovation is void.
 
-    Only by a bearing, which does not depend on the heading of what is read. insists: turn it also from a known heading.
+    Only by a bearing, which does not depend on the heading of the subject. insists: turn it also from a known heading.
     """
     entity, subject, turned = belief.entities[event.observer], belief.entities[event.subject], False
     if entity.kind != KIND_ROBOT or entity.at_yaw < 0:

@@ -24,7 +24,7 @@ _ANGLES = frozenset({"roll", "pitch", "yaw", "turned"})
 
 @dataclass(frozen=True, slots=True)
 class Suspicion:
-    """One possible cause: its sort, its owner ("": all), the figures that it frees, exchanged drones.
+    """One possible cause: what is wrong, whose ("": everybody's), the figures that may then err, exchanged drones.
 
     what: nothing, prints, aside, height, focal, turned, tilted, placed, heading, print, exchanged.
     """

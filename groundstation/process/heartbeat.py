@@ -125,8 +125,10 @@ class HeartbeatBlock:
         return self._words[slot * _WORDS_PER_SLOT + _LEFT]
 
     def clear(self, slot: int) -> None:
-        """Forget the former holder of a slot, before its successor starts; keep since when others send for it,
-        its vehicles' addresses, and its number for the successor."""
+        """Forget the former holder of a slot, before its successor starts.
+
+        Kept: since when others send for it, its vehicles' addresses, and its number for the successor.
+        """
         base = slot * _WORDS_PER_SLOT
         self._words[base : base + _SILENT_SINCE] = memoryview(bytes(_SILENT_SINCE * 8)).cast("q")
 

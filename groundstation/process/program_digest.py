@@ -42,7 +42,7 @@ def _dictionaries(part: Any) -> Iterator[str]:
 def program_digest(used: tuple[PlugIn, ...] = ()) -> str:
     """Return a digest of all sources and data of the product's packages, and of the packages of these plug-ins.
 
-    Of a plug-in's package it knows the version and its own modules, not what those import from others.
+    A plug-in counts with its package's version and modules; what these import from other packages does not count.
     """
     digest = hashlib.sha256()
     _take(digest, _PACKAGES)

@@ -149,7 +149,7 @@ def _instead(start: bytes) -> str:
 
 
 def open_parts(paths: Iterable[Path]) -> tuple[list[Recording], dict[Path, str]]:
-    """Return the parts that are recordings, and for each other one why it is not (killed before its first byte).
+    """Return the parts that are recordings, and for each other file why it is none (killed before its first byte).
 
     Raises the RecordingError of the first of them when none can be read.
     """

@@ -23,7 +23,7 @@ _SHOWN = 5
 
 
 class Again:
-    """Re-runs a source. With changes it is run twice, without and with them, so that only they differ.
+    """Re-runs a source; with changes twice, without and with them, so that the runs differ by nothing else.
 
     field: the resolved field as recorded; changed: the one to run with; changes: in words, none: only verify.
     """

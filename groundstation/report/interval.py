@@ -92,12 +92,12 @@ def _accepted(data: RunData) -> list[float]:
 
 
 def _shown(data: RunData, accepted: Sequence[float]) -> Iterator[float]:
-    """Yield when a drone was first seen in mode TRACK without an answer of anybody's [s]: a hole may hide all of them.
+    """Yield the times [s] when a drone was first seen in mode TRACK although nobody's answer to an order is recorded.
 
-    Answers are repeated for a fifth of a second, the mode is reported throughout.
+    A hole may hide all answers: they are repeated for a fifth of a second only, but the mode is reported throughout.
     """
     for reports in data.vehicles.values():
-        # One that tells no other mode before says nothing of when it began, unless nobody does.
+        # Reports that begin in mode TRACK do not tell when it began; they count only if no answer at all is recorded.
         before_s, mode = -np.inf, _TRACKS if accepted else ""
         for item in sorted(reports, key=lambda item: item.time_s):
             begins = item.message.mode == _TRACKS != mode

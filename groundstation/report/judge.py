@@ -48,7 +48,7 @@ class RunReport:
 
     @property
     def no_flight(self) -> Rerun | Stretch | NotFlown | None:
-        """Return the run that it repeats, the part that it is, or how nobody flew; None for a whole flight."""
+        """Return why this is no whole flight (a re-run, a part of a recording, nobody flew); None if it is one."""
         return self.rerun or self.stretch or self.not_flown
 
     @property

@@ -27,7 +27,7 @@ class _Order:
 
 
 class GivenOrders:
-    """Sends orders, repeats those that nobody answers, and answers the requests of other shells behind them.
+    """Sends orders, repeats unanswered ones, and answers the requests of other shells that led to them.
 
     Call `follow` 10 times a second or more; `say` receives lines for the person.
     """

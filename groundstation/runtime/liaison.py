@@ -26,7 +26,7 @@ VERSION = version("skein-groundstation")
 _TURN_NS = 50 * NS_PER_MS
 _ORDER_PERIOD_NS = NS_PER_S
 _SILENT_NS = 500 * NS_PER_MS
-# Of a host that has said that it ends its processes, which keeps a small computer busy.
+# For a host that announced that it ends its processes: that keeps a small computer busy.
 _ENDING_SILENT_NS = 3 * NS_PER_S
 # As long as drivers may take to land and end, including the guardian that waits for them.
 _LINGER_NS = 25 * NS_PER_S

@@ -111,7 +111,7 @@ class Operator:
     def heed_signal(self, driver: str, now_ns: int) -> None:
         """Let no start go on after somebody signalled a driver to land and end, as shells do that reach no router.
 
-        What of such a stop concerns other drivers was lost, so it counts for the team; drones in the air fly on.
+        Such a stop may have been meant for more drivers, so it counts for the team; drones in the air fly on.
         """
         stop = self._stop_of_all(f"signal-{driver}", f"a signal to {driver}", now_ns)
         self._requests.hear_stop(now_ns, stop)

@@ -80,7 +80,7 @@ class VehicleOrder:
 
 @dataclass(frozen=True, slots=True)
 class DriverProcess:
-    """A driver process: its vehicles, of which the first gives it its name, and its section as JSON."""
+    """A driver process: its vehicles (it is named after the first), and its section as JSON."""
 
     vehicles: tuple[str, ...]
     section: str

@@ -142,7 +142,7 @@ def stop_on_the_ground_ends_the_driver(case: Case) -> None:
 
 @check("stand")
 def end_on_the_ground_is_told(case: Case) -> None:
-    """The driver ends through `drivers.host`, which calls `child.finish`: else others land its vehicle after it."""
+    """The driver ends through `drivers.host`, which calls `child.finish`; otherwise others land its vehicle."""
     case.record.span("low battery")
     assert case.record.facts["finished"], "it ended without child.finish(), as if its vehicle still flew"
 

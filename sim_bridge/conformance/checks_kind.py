@@ -97,7 +97,7 @@ def sections_are_strict(case: Case) -> None:
 
 @check()
 def required_sections_exist(case: Case) -> None:
-    """Sections that must be given are sections that it has, and its example gives them."""
+    """Required sections are sections of this kind, and its example has them."""
     kind = case.subject.kind
     assert kind.required <= set(kind.sections), f"required: {sorted(kind.required - set(kind.sections))}"
     assert kind.required <= set(kind.example), f"example lacks {sorted(kind.required - set(kind.example))}"
@@ -189,7 +189,7 @@ def healthy_team_has_no_findings(case: Case) -> None:
 
 @check()
 def moved_sections_are_its_own(case: Case) -> None:
-    """A simulated network changes keys that its sections have, to values that they take."""
+    """A simulated network changes only keys of the kind's own sections, to permitted values."""
     kind = case.subject.kind
     for name, changes in kind.moved("127.0.0.1", case.subject.sections).items():
         assert name in kind.sections, f"{name} is no section of it"

@@ -45,7 +45,7 @@ def lands(case: Case, mark: str) -> None:
 def stops_without_positions(case: Case, mark: str) -> None:
     """The vehicle stands within 1.5 s, and then gathers no more speed than the error of its tilt explains.
 
-    Its positions ended with its driver, and nothing replaces them: it obeys by accelerometers alone.
+    The dead driver sends no positions any more, and nothing replaces them: the vehicle has its accelerometers only.
     """
     begin, _ = case.record.span(mark)
     motion = case.record.motion(mark, 0.9)

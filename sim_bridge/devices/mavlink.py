@@ -168,7 +168,7 @@ class MavlinkEmulator:
             self._say(*self.firmware.texts.popleft())
 
     def _reached(self) -> Iterator[tuple[Address, Channel]]:
-        """Yield the clients that it sends to: those heard of late, and the one that it calls."""
+        """Yield the clients that the vehicle sends to: those heard recently, and the one that it calls."""
         if self._calls is not None:
             self.channel(self._calls, self.habits.old_until_greeted)
         patience_ns = NEVER_NS if self.habits.one_partner else _FORGET_NS

@@ -25,7 +25,8 @@ _NO_CELL = _UNKNOWN = 65535
 _VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
 _POSITION_VARIANCE = 0.01  # as an autopilot states it [m^2]
 _SMALL_RATIO = 0.05
-# WIRE (PX4 1.16, source): its times without poses, and without one that it uses, until it navigates by its own inertia.
+# WIRE (PX4 1.16, source): the times without any pose, and without one that it fused, after which a PX4 navigates by its
+# inertial sensors alone.
 _FED_S, _AIDED_S = 0.4, 1.0
 
 

@@ -21,7 +21,7 @@ from sim_bridge.devices.mavlink_messages import Speaker
 from sim_bridge.devices.mavlink_time import SenderClock
 
 _ALL = 0
-# WIRE (PX4 1.15, source): what it takes though it is for all systems, and commands that it takes so.
+# WIRE (PX4 1.15, source): the only messages and commands that a PX4 accepts when they are addressed to all systems.
 _FOR_ALL = (f.SetPositionTargetLocalNed, s.Ping)
 _COMMANDS_FOR_ALL = (MavCmd.REQUEST_AUTOPILOT_CAPABILITIES, MavCmd.REQUEST_PROTOCOL_VERSION)
 # WIRE (MAV_MISSION_RESULT).

@@ -25,10 +25,10 @@ class Verdict(Enum):
 
 
 def read_by_px4(setpoint: SetPositionTargetLocalNed) -> Velocity | str:
-    """Return its velocity [its own frame], or the text with which a PX4 refuses it.
+    """Return a setpoint's velocity [frame of the setpoint], or the text with which a PX4 refuses it.
 
-    WIRE (PX4 1.15, source): per axis; one that is ignored or no number does not count. In the body's frame a velocity
-    counts as a whole, and a place not at all.
+    WIRE (PX4 1.15, source): each axis counts by itself, unless it is ignored or no number. In the body's frame only
+    whole velocities count, and no places.
     """
     s, name = setpoint, "SET_POSITION_TARGET_LOCAL_NED"
     if s.coordinate_frame not in (_LOCAL, _BODY):

@@ -16,7 +16,7 @@ VERSION = (4, 1)
 _TICKS_PER_S = 10_000_000
 _DATAGRAMS_PER_TICK = 64
 _FORGOTTEN_TICKS = 2000  # a client that is silent for 10 s is gone
-# The system's own delay before it sends a frame, which it states in it [s].
+# The delay before the system sends a frame [s]; each frame states it.
 _PROCESSING_S = 0.005
 
 

@@ -14,7 +14,7 @@ from sim_bridge.world.world import World
 
 
 class CaptureEye:
-    """Reports all bodies in its volume that it may observe, as its driver does, but without its watch over them."""
+    """Reports all permitted bodies in the system's volume, as its driver does, but does not check their poses."""
 
     def __init__(
         self, name: str, site: Site, errors: bool, rng: np.random.Generator, faults: Iterable[Fault] = ()

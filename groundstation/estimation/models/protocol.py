@@ -92,7 +92,7 @@ class ObservationModel(Protocol):
 
     @property
     def repeats_s(self) -> float:
-        """Time for which an error of one pair repeats: readings within it share one reading's information."""
+        """Time for which a pair's error repeats [s]: all readings of that time carry the information of one."""
 
     @property
     def stamp_std_s(self) -> float:

@@ -133,7 +133,7 @@ class VehicleView(NamedTuple):
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: how it flies home or climbs by itself, and in which mode, or "".
-    foreign: others fly it, so that its speed is judged, but not by its commands; piloted: a pilot's sticks may move it.
+    foreign: others fly it, so its speed is judged, but not by our commands; piloted: a pilot's sticks may move it.
     rises: in HOVER it continues to its take-off height. fell: that it fell since its last start, or "". refuses: its
     answer to the order to take off, if that refused for good; unarmed: why it does not start its motors yet though it
     is to take off, in its own words, or "".

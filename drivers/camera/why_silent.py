@@ -9,7 +9,7 @@ _REASONS = {
     "held_back": "came that the link had held back: improve the link, or lower rate or size of the pictures",
 }
 _UNDECODABLE = "came that cannot be decoded"
-# Counts of what is no picture, or one that was decoded.
+# Counts of data that are no pictures, and of pictures that were decoded all the same.
 _OTHERS = frozenset({"bytes", "pave_bytes", "second publisher", "detector", "size"})
 
 

@@ -83,7 +83,7 @@ class ParameterSetup:
                 yield ParameterDifference(wanted.mending(value), value, text)
 
     def _receives(self) -> bool:
-        """Return whether it says that it has received a transmitter since its start."""
+        """Return whether the vehicle reports that it has heard a transmitter since its start."""
         # WIRE (GCS.cpp): an ArduPilot's receiver is present from the transmitter's first word on, and healthy until
         # the failsafe of FS_THR_ENABLE.
         asked = command_to(self._system, MavCmd.REQUEST_MESSAGE, float(id_of(SysStatus)))

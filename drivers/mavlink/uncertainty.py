@@ -56,7 +56,7 @@ class StatedUncertainty:
                 self._doubt_climb(now_ns, message.pos_vert_variance)
 
     def _doubt(self, now_ns: int, *ratios: float) -> None:
-        # NaN: it compares nothing now, which does not refute what it found before.
+        # NaN: the autopilot compares nothing now, which does not refute its earlier result.
         if stated := [r for r in ratios if not math.isnan(r)]:
             self._ratio, self._ratio_ns = max(stated), now_ns
 

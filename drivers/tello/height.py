@@ -20,7 +20,7 @@ class Height(NamedTuple):
 
     @property
     def off_floor(self) -> bool:
-        """Return whether it cannot be that of a vehicle that stands."""
+        """Return whether a standing vehicle cannot report this height."""
         return self.m - 2.0 * self.std_m >= _OFF_FLOOR_M - 1e-9
 
     @property

@@ -29,7 +29,7 @@ _FREEDOM = 8.0
 class Change:
     """Differences of a record: over a window, less `kept` of those over the window before. Indices into its times.
 
-    alike: this many of them count as one, beyond those that overlap.
+    alike: so many differences count as one, beyond the overlap of their windows.
     """
 
     window_s: float

@@ -22,7 +22,7 @@ _NOBODY: Mapping[str, str] = MappingProxyType({})
 
 @dataclass(slots=True)
 class Followed:
-    """One command on the bus, with its answers; `by`: the viewer who gave it, `ref`: that page's own id of it.
+    """One command on the bus, with its answers; `by`: the viewer who gave it; `ref`: the id from that viewer's page.
 
     instead: the reported activity, at the time-out, of each drone that has not done it.
     """

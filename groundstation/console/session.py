@@ -99,7 +99,7 @@ class Sessions:
         return self.operator_lock.client == hello.client and self._has_token(hello)
 
     def summary(self, now_ns: int) -> dict[str, Any]:
-        """Return the viewers and the operator's name; its page's id is its right, which no other page may learn."""
+        """Return the viewers and the operator's name; never the id of the operator's page, which gives its rights."""
         return {
             "operator": self.operator_lock.name,
             "viewers": len(self.viewers),

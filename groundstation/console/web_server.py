@@ -13,7 +13,7 @@ from groundstation.console.network import Network
 
 
 class WebServer(uvicorn.Server):
-    """A server that leaves signals to its process, which stops it."""
+    """A server that handles no signals: its process does, and stops it."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -24,7 +24,7 @@ class WebServer(uvicorn.Server):
 def serve(
     app: Asgi, listener: socket.socket, http: type[Any], network: Network | None = None
 ) -> tuple[WebServer, "asyncio.Task[None]"]:
-    """Start to serve; returns the server, which ends by its `should_exit`, and its task.
+    """Start to serve; returns the server (set its `should_exit` to end it) and its task.
 
     http: uvicorn's protocol class of a connection; network: its TLS certificate is used, for devices.
     """

@@ -43,8 +43,8 @@ def _can_be_spared(
 ) -> bool:
     """Return whether all other tracking robots stay located without one, and some of the level that sees the targets.
 
-    To begin, those that a view locates must be in it; then a little outside is near enough, else one at the border of a
-    view would call the scout back again and again.
+    Before a scout leaves, robots that a view locates must be in it. Afterwards a little outside is near enough, since a
+    robot at the border of a view would otherwise call the scout back again and again.
     """
     outside_m, place = _OUTSIDE_M if _searched(name, now) else 0.0, now.belief.mean_of(name)[:2]
     others = [other for other in tracking if other != name]

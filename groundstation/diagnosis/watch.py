@@ -41,7 +41,7 @@ class FigureWatch:
             named = {_NO_FIGURE: self._no_figure(now_ns)}
         notices = [_accusation(figure, key) for key, figure in named.items() if key not in self._standing]
         accused = {suspect for key in named for suspect in key}
-        # Others explain it now, unless this one was found beside one of them.
+        # Other figures explain the flight now, unless a standing suspicion was found again together with them.
         replaced = bool(named) and not named.keys() & self._standing.keys()
         kept = dict[tuple[Suspect, ...], SuspectedFigure]()
         for key, figure in self._standing.items():

@@ -120,7 +120,7 @@ def camera_findings(
 
 
 def _stream(name: str, status: CameraStatus, what: str, used: str, sees: Sequence[str]) -> Finding:
-    """Return the rate and age of a sensor's data; what, used: words for these, and for those that were used."""
+    """Return the rate and age of a sensor's data; what, used: words for all of them, and for the used ones."""
     seen = f", sees {', '.join(sees)}" if sees else ""
     found = f"{status.fps:.0f} {what}/s, {status.age_ms:.0f} ms old, {status.detections} {used}{seen}"
     if status.fps >= _PICTURES_HZ and status.age_ms <= _PICTURES_OLD_MS:

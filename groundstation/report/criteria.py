@@ -113,7 +113,7 @@ def overload(figures: RunFigures) -> str:
 def _of_the_targets(figures: RunFigures, field: ResolvedField, expected: Expectation) -> Iterator[Criterion]:
     yield from _of_the_target(figures, expected)
     if figures.targets:
-        # One that the truth never shows while it shows others was not judged at all.
+        # A target that the truth never shows, while it shows others, was not judged at all.
         judged = min(figures.targets[name].judged if name in figures.targets else 0.0 for name in field.tracked)
         if judged < 1.0:
             yield _above("target_judged", judged, MIN_JUDGED)

@@ -9,7 +9,7 @@ _MOST = 62
 
 
 class Heir(Protocol):
-    """The part of a child process that outlives it: one number."""
+    """What a child process leaves to its successor: one number."""
 
     @property
     def left(self) -> int:

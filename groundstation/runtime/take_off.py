@@ -48,8 +48,8 @@ class TakeOff:
     """One take-off of the given drones, except those that fly already; finished when no drone is waiting.
 
     up: drones that flew already (flew) or were seen in flight; left_out: the others, with reasons; awaits: those of
-    them that only a person may start now; mistake: the likely mix-up that ended the sequence early. It lands none but
-    those that it lifted.
+    them that only a person may start now; mistake: the likely mix-up that ended the sequence early. It lands only
+    drones that it lifted.
     """
 
     def __init__(

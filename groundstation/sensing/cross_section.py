@@ -67,7 +67,7 @@ def _middle(borders: Sequence[Border], ahead: Sequence[float], radius_m: float) 
 def _half_sides(limits: Sequence[Border]) -> tuple[float, float]:
     """Return the half sides of the largest rectangle about a middle; limits: borders from there, slopes not below 0.
 
-    It touches one border in that one's middle, or two at a corner.
+    Its corner touches one border in the middle between the axes, or two borders where they meet.
     """
     touching = [(0.5 * most / a, 0.5 * most / b) for a, b, most in limits if min(a, b) > _PARALLEL]
     for i, (a, b, most) in enumerate(limits):

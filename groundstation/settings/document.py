@@ -94,7 +94,7 @@ def dotted(path: KeyPath) -> str:
 def read(path: Path, name: str = "", named_in: Path | None = None) -> Node:
     """Return a file's content; raises SettingsError naming file and line of every fault that makes it unreadable.
 
-    named_in: the file that names this one, which is not meant.
+    named_in: the file that names this one; it is not suggested in its place.
     """
     name = name or str(path)
     try:

@@ -84,7 +84,7 @@ def signs_of(block: HeartbeatBlock, slot: int, *, gone: bool = False) -> DriverS
 
 
 def silent_since(signs: DriverSigns, before_ns: int, now_ns: int, awake_since_ns: int, limit_ns: int) -> int:
-    """Return since when a drone is without its driver [ns]; 0: it has one, never had one, or no longer needs one.
+    """Return since when a drone has been without its driver [ns]; 0 if it has one, had none or needs none any more.
 
     before_ns: the same as last recorded; only a driver that finished its start resets it.
     """

@@ -89,7 +89,7 @@ def authority_of(site: str) -> Authority:
 
 
 def certify(run: Path, site: str, address: str, listen: str, names: Iterable[str]) -> None:
-    """Make the certificates of a run in its folder; if it listens for other hosts, the site vouches for it."""
+    """Make the certificates of a run in its folder; if it listens for other hosts, the site's authority signs them."""
     above = authority_of(site) if listen else None
     make_identities(run, [address, listen] if listen else [address], names, above)
 

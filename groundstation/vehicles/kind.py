@@ -107,7 +107,7 @@ class StopDatagrams:
 class Offer:
     """Text of `groundstation new` for a type of this kind and for each drone of it, beside the keys of all drones.
 
-    title: its name for people, "" if its word is one. of_type, of_drone: YAML, indented by four; pictures: the
+    title: its name for people, "" to use its word. of_type, of_drone: YAML, indented by four; pictures: the
     address of its camera's. {address} is the drone's own, {id} a number that no other drone has. address: that of a
     new vehicle of the type, if it is an access point and a team has one of them.
     """

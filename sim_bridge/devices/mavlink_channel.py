@@ -16,7 +16,7 @@ class Channel:
     """One client. old: it is sent MAVLink 1; heard_ns: time of its last frame; listed: its next parameter, or None.
 
     WIRE (PX4, MAV_PROTO_VER 0): MAVLink 1 until a frame of MAVLink 2 arrives, and never again. ArduPilot did so until
-    4.0; 4.5 goes by SERIALn_PROTOCOL alone. Here both follow their client, so that old ones understand them.
+    4.0; 4.5 goes by SERIALn_PROTOCOL alone. Here both firmwares follow the client, so that old clients understand them.
     """
 
     def __init__(self, encoder: FrameEncoder, rates: Rates, clock: SenderClock, old: bool) -> None:

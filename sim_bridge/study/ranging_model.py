@@ -13,7 +13,7 @@ from sim_bridge.ranges import Radios
 from sim_bridge.site import Site
 from sim_bridge.world.world import World
 
-# robot, its ranges -> those of them that the driver passes on
+# (robot, all its ranges) -> the ranges that the driver passes on
 Sound = Callable[[str, Mapping[str, float]], dict[str, float]]
 
 

@@ -18,7 +18,7 @@ def open_link(
 ) -> MavlinkLink:
     """Return the link that the settings describe; raises DriverError when it cannot be opened.
 
-    shown: wraps its transport in one that others see as well.
+    shown: wraps the transport so that others see its traffic as well.
     """
     transport: Transport
     if settings.target.startswith("serial"):

@@ -37,7 +37,7 @@ class Event(Message, frozen=True, kw_only=True):
 
     @property
     def sentence(self) -> str:
-        """Return the text with its entity before it, unless it begins with that."""
+        """Return the text, preceded by the entity unless the text begins with it."""
         entity = self.header.entity
         return self.text if self.text.startswith(entity) else f"{entity}: {self.text}"
 

@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from pydantic import Field
 
+from drivers.motion_capture.wire.natnet import COMMAND_PORT
 from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of, topic_of
 from drivers.vehicle_settings import DriverSection, Name, NotNegative, Positive
 from groundstation import plug_ins
@@ -22,8 +23,8 @@ class PoseProtocol:
     """A protocol for poses: its usual port, its reader, and the parts that its address may have beside a host.
 
     reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`; paths: a path and a
-    query; any_port: another port than the usual one. answers_at: its TCP port, from that of the address on, at which it
-    is asked for a sign of life before the library connects: that waits for it, with the whole process, for ever.
+    query; any_port: another port than the usual one. answers_at: distance from the port of the address to the TCP port
+    that is tried before the library connects, which would wait for an absent system for ever, with the whole process.
     """
 
     port: int
@@ -37,7 +38,7 @@ _NATNET = "natnet"
 _SOURCES = "drivers.motion_capture.sources"
 # Those of other packages are entry points `skein.world_sensors`: the name is the scheme, the object the reader itself.
 OURS: Mapping[str, PoseProtocol] = {
-    _NATNET: PoseProtocol(1510, f"{_SOURCES}:NatnetSource"),
+    _NATNET: PoseProtocol(COMMAND_PORT, f"{_SOURCES}:NatnetSource"),
     # The library takes another port for Qualisys only.
     "vicon": PoseProtocol(801, f"{_SOURCES}:LibrarySource", any_port=False, answers_at=0),
     "qualisys": PoseProtocol(22222, f"{_SOURCES}:LibrarySource", answers_at=1),

@@ -4,8 +4,6 @@ from enum import IntEnum, IntFlag
 
 # SET_POSITION_TARGET_LOCAL_NED.type_mask: obey velocity and yaw rate, ignore all else (docs/reference/mavlink.md 5.1).
 VELOCITY_AND_YAW_RATE = 0x5C7
-VELOCITY_AND_YAW = 0x9C7
-VELOCITY_ONLY = 0xDC7
 ARMED = 128
 CUSTOM_MODE_ENABLED = 1
 FORCE = 21196.0

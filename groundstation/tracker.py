@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, VehicleStatus, Verdict
 from groundstation.bus.notice import Notice
 from groundstation.control.drift import DriftWatch
@@ -252,26 +253,20 @@ class Tracker:
     def setpoints(self, now_ns: int) -> dict[str, Limited]:
         """Return each airborne robot's setpoint, limited by the newest belief; robots of unknown place hover."""
         p, airborne = self.parameters, self.airborne
-        belief, lookout, plan = self._belief.core(), self.lookout, self.current
+        belief, plan = self._belief.core(), self.current
         stale = self._plans.is_stale(now_ns)
         if plan is not None and stale:
             plan = plan.halted(belief)  # ways back and searches need none
-        unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
-        seen_s = [self.filter.age_s(name) for name in self._targets if name not in lookout.missing]
-        sure = (n for n, age_s in self.unlocalised_s().items() if age_s == 0.0 and not self.filter.contradicted(n))
-        sure_s = {name: self._tied_age_s(name) for name in sure}
         velocities = {name: np.array(self.filter.velocity_of(name)) for name in belief.layout.robots}
         drifts = {
             name: self._drifts[name].see(now_ns, belief.mean_of(name)[:3] + p.safety.reaction_s * velocity)
             for name, velocity in velocities.items()
         }
-        sight = Sight(
-            min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
-            lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
-            lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities,
-            {n: self._roots.helped_age_s(n) for n in belief.layout.robots}, self._modes, lookout.blind)  # fmt: skip
+        sight = self._sight(belief, velocities, drifts)
         wanted = setpoints_from_plan(plan, belief, airborne, p.control, p.sensors, sight)
         self._modes = {name: one.phase for name, one in wanted.items()}
+        sure = (n for n, age_s in self.unlocalised_s().items() if age_s == 0.0 and not self.filter.contradicted(n))
+        sure_s = {name: self._tied_age_s(name) for name in sure}
         safety, shafts = self._hovering.within(p.safety), self._shafts.around(belief, airborne)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, safety, velocities, drifts, shafts)
@@ -281,11 +276,24 @@ class Tracker:
         for name, entry in limited.items() if stale else ():
             if entry.setpoint.phase is FlightMode.TRACK:
                 limited[name] = replace(entry, limited_by=(*entry.limited_by, "stale plan"))
-        for name in drifts.keys() & limited.keys():
-            is_obeyed = limited[name].holds or name not in lookout.unmoved
-            velocity = np.array(limited[name].setpoint.velocity_m_s) if is_obeyed else np.zeros(3)
-            self._drifts[name].note_command(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
+        self._note_commands(belief, {name: entry for name, entry in limited.items() if name in drifts})
         return limited
+
+    def _sight(self, belief: JointBelief, velocities: Mapping[str, Array], drifts: Mapping[str, Array]) -> Sight:
+        lookout, robots = self.lookout, belief.layout.robots
+        seen_s = (self.filter.age_s(name) for name in self._targets if name not in lookout.missing)
+        return Sight(
+            min(seen_s, default=None), {name: self.filter.age_s(name) for name in robots}, lookout.missed_s,
+            lookout.missing, lambda robots, targets: lookout.stands(robots, targets, belief),
+            lookout.velocity_errors_m_s, drifts, lookout.unsteered, {n: self._tied_age_s(n) for n in robots},
+            velocities, {n: self._roots.helped_age_s(n) for n in robots}, self._modes, lookout.blind)  # fmt: skip
+
+    def _note_commands(self, belief: JointBelief, sent: Mapping[str, Limited]) -> None:
+        """Note the velocities that robots fly from now on, to tell a drift from what was commanded."""
+        for name, entry in sent.items():
+            is_obeyed = entry.holds or name not in self.lookout.unmoved
+            velocity = np.array(entry.setpoint.velocity_m_s) if is_obeyed else np.zeros(3)
+            self._drifts[name].note_command(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
 
     def _topology_now(self) -> Topology:
         flying = [name for name in self._belief.layout.robots if self.filter.airborne(name)]

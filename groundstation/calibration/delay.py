@@ -161,32 +161,43 @@ def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], 
 
 
 def _odometry(drone: str, settings: FieldDrone, habits: OdometryRobot, track: _Track, own: _Own) -> list[Delay]:
-    names = [f"drones.{drone}.odometry.{kind}_delay_ms" for kind in ("velocity", "height")]
-    now_ms = [settings.odometry.velocity_delay_ms, settings.odometry.height_delay_ms]
-    if len(track.times) < LEAST_SEEN or len(own.times) < LEAST_SEEN:
-        reason = "no fixed camera saw it long enough"
-        told = zip(("velocity", "height"), names, now_ms, (_DASH, _CLIMB), strict=True)
-        return [Delay(f"{drone} {kind}", name, now, reason=reason, flight=flight) for kind, name, now, flight in told]
-    body = _body_positions(track, own, settings.marker.position_m)
-    lasting_s = habits.velocity_bias_correlation_s
-    brief = own.without_jumps(briefly(track.times, lasting_s), track.times)
-    velocity = shift_between([Part(track.times, body[:, :2], _path(track, own), brief)], True)
-    known = np.isfinite(own.height)
-    height = None
-    in_a_second = across(track.times)
-    climbing = np.abs(in_a_second(body[:, 2:])) > _CLIMB_M
-    if known.sum() > LEAST_SEEN and climbing.sum() >= _CLIMBING_S * rate_hz(track.times):
-        reported = interpolated(own.times[known], own.height[known, None])
-        height = shift_between([Part(track.times, body[:, 2:], reported, in_a_second)], False)
-    reasons = ("it moved too little in sight of a fixed camera", "it climbed too little, or reports no height")
+    now = settings.odometry
+    velocity = height = None
+    still = level = "no fixed camera saw it long enough"
+    if len(track.times) >= LEAST_SEEN and len(own.times) >= LEAST_SEEN:
+        body = _body_positions(track, own, settings.marker.position_m)
+        velocity = _velocity_shift(track, own, body[:, :2], habits.velocity_bias_correlation_s)
+        height = _height_shift(track, own, body[:, 2:])
+        still = "it moved too little in sight of a fixed camera"
+        level = "it climbed too little, or reports no height"
     return [
-        Delay(f"{drone} {kind}", name, now, 1e3 * shift[0], 1e3 * shift[1], flight=flight)
-        if shift is not None
-        else Delay(f"{drone} {kind}", name, now, reason=reason, flight=flight)
-        for kind, name, now, shift, reason, flight in zip(
-            ("velocity", "height"), names, now_ms, (velocity, height), reasons, (_DASH, _CLIMB), strict=True
-        )
+        _reported(drone, "velocity", now.velocity_delay_ms, velocity, still, _DASH),
+        _reported(drone, "height", now.height_delay_ms, height, level, _CLIMB),
     ]
+
+
+def _reported(
+    drone: str, kind: str, now_ms: float, shift_s: tuple[float, float] | None, reason: str, flight: str
+) -> Delay:
+    """Return the delay of a drone's velocities or heights; reason: why it is not known, where it is not."""
+    name, key = f"{drone} {kind}", f"drones.{drone}.odometry.{kind}_delay_ms"
+    if shift_s is None:
+        return Delay(name, key, now_ms, reason=reason, flight=flight)
+    return Delay(name, key, now_ms, 1e3 * shift_s[0], 1e3 * shift_s[1], flight=flight)
+
+
+def _velocity_shift(track: _Track, own: _Own, seen_m: Array, lasting_s: float) -> tuple[float, float] | None:
+    brief = own.without_jumps(briefly(track.times, lasting_s), track.times)
+    return shift_between([Part(track.times, seen_m, _path(track, own), brief)], True)
+
+
+def _height_shift(track: _Track, own: _Own, seen_m: Array) -> tuple[float, float] | None:
+    known, in_a_second = np.isfinite(own.height), across(track.times)
+    climbing = np.abs(in_a_second(seen_m)) > _CLIMB_M
+    if known.sum() <= LEAST_SEEN or climbing.sum() < _CLIMBING_S * rate_hz(track.times):
+        return None
+    reported = interpolated(own.times[known], own.height[known, None])
+    return shift_between([Part(track.times, seen_m, reported, in_a_second)], False)
 
 
 def _body_positions(track: _Track, own: _Own, marker_m: tuple[float, float, float]) -> Array:

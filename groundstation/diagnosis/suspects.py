@@ -111,16 +111,21 @@ def _tried(verdict: Verdict, batch: TeamBatch, between: TeamBatch, alike: float)
             _charge(one.explained.information, one.explained.pull, sigma, one.suspicion, one.lead) for one in trials
         ]
         if charges and is_told(charges[0]):
-            near = [charge for charge in charges if charge.lead > charges[0].lead - RULED_OUT]
+            near = _as_likely(charges)
             charges = _confirmed(near, [known[one.suspect] for one in near], again, sigma) + charges[len(near) :]
         if not causes:  # later leads come on top of causes that were found
             leads |= {charge.suspect: charge.lead for charge in charges}
         if not charges or not is_told(charges[0]):
             break
         best = charges[0]
-        causes.append(tuple(charge for charge in charges if charge.lead > best.lead - RULED_OUT))
+        causes.append(_as_likely(charges))
         sigma, without = sigma + spread(known[best.suspect]), without + best.lead
     return Verdict(tuple(causes), leads)
+
+
+def _as_likely(charges: Sequence[Charge]) -> tuple[Charge, ...]:
+    """Return the charges, likeliest first, that the likeliest does not rule out."""
+    return tuple(charge for charge in charges if charge.lead > charges[0].lead - RULED_OUT)
 
 
 def _confirmed(

@@ -33,11 +33,8 @@ def remedies(charges: Sequence[Charge], field: ResolvedField) -> str:
 
 
 def _what(charge: Charge, field: ResolvedField) -> str:
-    (who, what), more = charge.suspect, charge.size > 0.0
-    factor, unit = unit_of(_UNITS.get(what, what))
-    digits = 1 if unit in ("deg", "%") else 0
-    size = f"{abs(factor * charge.size):.{digits}f} +- {factor * charge.std:.{digits}f} {unit}"
-    camera = "every drone's camera" if not who else fixed_camera(who) if who in field.cameras else f"{who}'s camera"
+    (who, what), more, size = charge.suspect, charge.size > 0.0, _size(charge)
+    camera = _camera(who, field)
     if what in _MOUNTED:
         return f"{camera} {_MOUNTED[what][not more].format(size=size)} than the field says"
     if what == "print":
@@ -48,12 +45,28 @@ def _what(charge: Charge, field: ResolvedField) -> str:
         return hangs(who, what, more, size)
     if what == "scale":
         return f"{who}'s true velocities are {size} {'larger' if more else 'smaller'} than the field says"
+    age = f"{size} {'older' if more else 'newer'}"
     if what == "own_delay":
-        return f"{who}'s telemetry is {size} {'older' if more else 'newer'} than its stamps say"
-    reported = _REPORTED.get(what)
+        return f"{who}'s telemetry is {age} than its stamps say"
+    if what in _REPORTED:
+        return f"{who}'s {_REPORTED[what]} are {age} than configured"
     pictures = f"{who}'s pictures" if who in field.cameras else f"the pictures of {camera}"
-    late = f"{who}'s {reported}" if reported else pictures
-    return f"{late} are {size} {'older' if more else 'newer'} than configured"
+    return f"{pictures} are {age} than configured"
+
+
+def _size(charge: Charge) -> str:
+    """Return the error's size and deviation in the unit of the field file."""
+    _, what = charge.suspect
+    factor, unit = unit_of(_UNITS.get(what, what))
+    digits = 1 if unit in ("deg", "%") else 0
+    return f"{abs(factor * charge.size):.{digits}f} +- {factor * charge.std:.{digits}f} {unit}"
+
+
+def _camera(who: str, field: ResolvedField) -> str:
+    """Return words for the camera of a suspect; "" are all drones."""
+    if not who:
+        return "every drone's camera"
+    return fixed_camera(who) if who in field.cameras else f"{who}'s camera"
 
 
 def _remedy(charge: Charge, field: ResolvedField) -> str:

@@ -143,16 +143,9 @@ class Flight:
         if self._plan.look_only or self._breaks_off():
             return self._supervisor.failure  # a failure during the checks must not be answered by a take-off
         if self._plan.asks:
-            self._prompting = True
-            self._keyboard.forget()
-            insist = "type anyway and press Enter" if self._forbidden else "press Enter"
-            self._say(f"{self._state()}. To take off and track {insist} (Ctrl-C ends), or use: groundstation takeoff")
-        else:
-            self._say(f"{self._state()}; taking off")
-            operator.take_off(now_ns, anyway=self._plan.anyway, given_ns=self._began_ns)
-            if operator.forbidden:
-                return f"nobody took off: {operator.forbidden}{'; to fly all the same: --anyway' * self._forbidden}"
-            self._start.show_screen()
+            self._ask()
+        elif failure := self._take_off(operator, now_ns):
+            return failure
         began_ns = now_ns
         while True:
             now_ns = self._turn(operator)
@@ -169,6 +162,21 @@ class Flight:
             ended, failure = self._is_over(operator, now_ns, began_ns)
             if ended:
                 return failure
+
+    def _ask(self) -> None:
+        self._prompting = True
+        self._keyboard.forget()
+        insist = "type anyway and press Enter" if self._forbidden else "press Enter"
+        self._say(f"{self._state()}. To take off and track {insist} (Ctrl-C ends), or use: groundstation takeoff")
+
+    def _take_off(self, operator: Operator, now_ns: int) -> str:
+        """Order the take-off; return why it was forbidden, "" if it was not."""
+        self._say(f"{self._state()}; taking off")
+        operator.take_off(now_ns, anyway=self._plan.anyway, given_ns=self._began_ns)
+        if operator.forbidden:
+            return f"nobody took off: {operator.forbidden}{'; to fly all the same: --anyway' * self._forbidden}"
+        self._start.show_screen()
+        return ""
 
     def _tell_grounded(self, operator: Operator, now_ns: int) -> None:
         """Report what the run waits for if drones landed without an order for all: by watchdogs, or one order each."""

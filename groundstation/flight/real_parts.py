@@ -112,6 +112,30 @@ def _address(name: str, source: str, place: str) -> tuple[str, int]:
 
 
 def _require_sense(field: Field, parts: RealParts) -> None:
+    """Refuse runs that would be unsafe, or show nothing: with OperatorMistake."""
+    _require_places(field, parts)
+    for name in sorted(parts.cameras - set(field.cameras) - set(parts.drones)):
+        raise OperatorMistake(f"--real {camera_name(name)}: {name}, which carries it, must be real as well")
+    if parts.targets and not parts.cameras | parts.systems:
+        raise OperatorMistake(f"--real {min(parts.targets)}: no sensor is real, so nothing can see it")
+    addresses = [body.address for body in parts.drones.values() if body.address is not None]
+    if len(set(addresses)) < len(addresses):
+        raise OperatorMistake("--real: two drones have the same port for their true pose")
+    if _is_everything(field, parts):
+        raise OperatorMistake("--real: nothing is left to emulate; use: groundstation fly")
+
+
+def _is_everything(field: Field, parts: RealParts) -> bool:
+    return (
+        len(parts.drones) == len(field.drones)
+        and parts.cameras >= {*field.cameras, *field.drones}
+        and parts.systems >= set(field.volumes)
+        and len(parts.targets) == len(field.tracked)
+    )
+
+
+def _require_places(field: Field, parts: RealParts) -> None:
+    """Refuse a real drone whose place nothing real measures."""
     fixed = parts.cameras & set(field.cameras) | parts.systems - set(field.truth.values())
     for name, body in parts.drones.items():
         if body.source == ESTIMATE and not fixed:
@@ -122,17 +146,6 @@ def _require_sense(field: Field, parts: RealParts) -> None:
                 f"camera or system that sees it real as well (--real {sensor}), or, if the simulator of its "
                 f"firmware flies it, name the port of its true pose (--real {name}=autopilot:PORT)"
             )
-    for name in sorted(parts.cameras - set(field.cameras) - set(parts.drones)):
-        raise OperatorMistake(f"--real {camera_name(name)}: {name}, which carries it, must be real as well")
-    if parts.targets and not parts.cameras | parts.systems:
-        raise OperatorMistake(f"--real {min(parts.targets)}: no sensor is real, so nothing can see it")
-    addresses = [body.address for body in parts.drones.values() if body.address is not None]
-    if len(set(addresses)) < len(addresses):
-        raise OperatorMistake("--real: two drones have the same port for their true pose")
-    everything = len(parts.drones) == len(field.drones) and parts.cameras >= {*field.cameras, *field.drones}
-    everything = everything and parts.systems >= set(field.volumes)
-    if everything and len(parts.targets) == len(field.tracked):
-        raise OperatorMistake("--real: nothing is left to emulate; use: groundstation fly")
 
 
 def notes(field: Field, parts: RealParts) -> list[str]:

@@ -1,6 +1,7 @@
 """Calibrates all figures of a team from one recorded flight: finds the wrong ones, and the settings that mend them."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -119,20 +120,24 @@ def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
     final = explain(sigma)
     error, covariance = posterior(final.information, final.pull, sigma)
     _, doubtful = posterior(free.information, free.pull, np.diag(figures.wide**2))
-    std, doubtful_std = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(doubtful))
+    std = np.sqrt(np.diag(covariance))
     kept = [one for one in told if _worth(one, figures.keys, error, std)]
     moved = freed(kept) if kept else np.zeros(len(figures.keys), bool)
-    rows = []
-    for index, (who, part) in enumerate(figures.keys):
-        factor, unit = unit_of(part)
-        shown = bool(doubtful_std[index] <= _NEEDED[part])
-        off, one, doubt = (float(factor * value[index]) for value in (error, std, doubtful_std))
-        beside = _beside(index, doubtful, figures.keys)
-        rows.append(Measured(who, part, unit, off, one, doubt, shown, beside, bool(moved[index])))
     settings = changes(figures, error, moved) if kept else {}
     better = gain(flown, field, with_changes(field, settings), batch.targets) if settings else None
     found = tuple(_found(one, figures.keys, error, std) for one in kept)
-    return TeamCalibration(tuple(rows), found, settings, better, final.used, final.misfit)
+    measured = tuple(_measured(figures.keys, error, std, doubtful, moved))
+    return TeamCalibration(measured, found, settings, better, final.used, final.misfit)
+
+
+def _measured(keys: tuple[Key, ...], error: Array, std: Array, doubtful: Array, moved: Array) -> Iterator[Measured]:
+    """Yield all figures; doubtful (n, n): their covariance if each of them may be quite wrong."""
+    doubtful_std = np.sqrt(np.diag(doubtful))
+    for index, (who, part) in enumerate(keys):
+        factor, unit = unit_of(part)
+        shown = bool(doubtful_std[index] <= _NEEDED[part])
+        off, one, doubt = (float(factor * value[index]) for value in (error, std, doubtful_std))
+        yield Measured(who, part, unit, off, one, doubt, shown, _beside(index, doubtful, keys), bool(moved[index]))
 
 
 def _beside(index: int, covariance: Array, keys: tuple[Key, ...]) -> Key | None:

@@ -95,30 +95,45 @@ class TeamRecord:
 def team_record(flown: Flown, field: ResolvedField) -> TeamRecord:
     """Return the data of a flight; times count from its first tick."""
     zero_ns = flown.ticks[0][0]
-    intake = AttitudeIntake(parameters_from_field(field).inertial)
-    standing = dict.fromkeys(field.drones, True)
-    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in field.drones}
-    stands: dict[str, list[float]] = {name: [] for name in field.drones}
-    flew = set(flown.off_pads)
+    reports = _OwnReports(flown, field)
     for message in _messages(flown):
-        name, stamp_ns = message.header.entity, message.header.stamp_ns
-        at_s = (stamp_ns - zero_ns) / NS_PER_S
-        if name not in rows:
-            continue
+        if message.header.entity in field.drones:
+            reports.take(message, (message.header.stamp_ns - zero_ns) / NS_PER_S)
+    return TeamRecord(reports.own(), _sightings(flown, field, zero_ns), reports.stands(), flown.duration_s)
+
+
+class _OwnReports:
+    """Collects what drones report of themselves: their motion, and when they stand on their pads."""
+
+    def __init__(self, flown: Flown, field: ResolvedField) -> None:
+        self._intake = AttitudeIntake(parameters_from_field(field).inertial)
+        self._rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in field.drones}
+        self._stands: dict[str, list[float]] = {name: [] for name in field.drones}
+        self._standing = dict.fromkeys(field.drones, True)
+        self._flew = set(flown.off_pads)
+
+    def take(self, message: Message, at_s: float) -> None:
+        """Take a message about a drone."""
+        name = message.header.entity
         if isinstance(message, VehicleStatus) and message.flight_state is not FlightState.UNKNOWN:
-            standing[name] = message.flight_state in _STANDING
-            if not standing[name]:
-                flew.add(name)
-            elif name not in flew:  # after its first flight it may stand anywhere
-                stands[name].append(at_s)
+            self._standing[name] = message.flight_state in _STANDING
+            if not self._standing[name]:
+                self._flew.add(name)
+            elif name not in self._flew:  # after its first flight it may stand anywhere
+                self._stands[name].append(at_s)
         elif isinstance(message, ImuSample):
-            intake.imu(message, stamp_ns, standing[name])
+            self._intake.imu(message, message.header.stamp_ns, self._standing[name])
         elif isinstance(message, Odometry):
-            rows[name].append(_row(intake, message, at_s))
-    own = {name: _own(found) for name, found in rows.items() if len(found) > 1}
-    spans = {name: (times[0], times[-1]) for name, times in stands.items() if times}
-    stood = {name: span for name, span in spans.items() if span[1] - span[0] >= _LEAST_STAND_S}
-    return TeamRecord(own, _sightings(flown, field, zero_ns), stood, flown.duration_s)
+            self._rows[name].append(_row(self._intake, message, at_s))
+
+    def own(self) -> dict[str, OwnMotion]:
+        """Return the motion of each drone that reported it."""
+        return {name: _own(found) for name, found in self._rows.items() if len(found) > 1}
+
+    def stands(self) -> dict[str, tuple[float, float]]:
+        """Return begin and end [s] of each drone's stand before its first flight, if it was long enough."""
+        spans = {name: (times[0], times[-1]) for name, times in self._stands.items() if times}
+        return {name: span for name, span in spans.items() if span[1] - span[0] >= _LEAST_STAND_S}
 
 
 def _row(intake: AttitudeIntake, message: Odometry, at_s: float) -> tuple[float, ...]:

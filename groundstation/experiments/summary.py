@@ -27,25 +27,30 @@ def _by_group(rows: Sequence[dict[str, Any]], figures: Callable[[list[dict[str, 
 
 def _merits(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     merits = [row["merits"] for row in rows]
-    rmse, worst = [m["rmse_m"] for m in merits], [m["max_error_m"] for m in merits]
+
+    def each(figure: str) -> list[Any]:
+        return [one[figure] for one in merits]
+
     entry = {
         "seeds": len(rows),
-        "mean_trace_m2": float(np.mean([m["mean_trace_m2"] for m in merits])),
-        "rmse_m_median": float(np.median(rmse)),
-        "rmse_m_worst": float(max(rmse)),
-        "max_error_m_median": float(np.median(worst)),
-        "lost_runs": sum(m["lost"] for m in merits),
-        "switches_mean": float(np.mean([m["switches"] for m in merits])),
-        "levels_last_mean": float(np.mean([m["levels_last"] for m in merits])),
-        "readings_per_step": float(np.mean([m["readings_per_step"] for m in merits])),
-        "consistency": float(np.mean([m["consistency"] for m in merits])),
+        "mean_trace_m2": float(np.mean(each("mean_trace_m2"))),
+        "rmse_m_median": float(np.median(each("rmse_m"))),
+        "rmse_m_worst": float(max(each("rmse_m"))),
+        "max_error_m_median": float(np.median(each("max_error_m"))),
+        "lost_runs": sum(each("lost")),
+        "switches_mean": float(np.mean(each("switches"))),
+        "levels_last_mean": float(np.mean(each("levels_last"))),
+        "readings_per_step": float(np.mean(each("readings_per_step"))),
+        "consistency": float(np.mean(each("consistency"))),
     }
     if "as_in_the_paper" in merits[0]:
-        entry["as_in_the_paper"] = sum(m["as_in_the_paper"] for m in merits)
-        two = [m["decisions_to_two_levels"] for m in merits]
-        entry["two_levels_within_3_decisions"] = sum(k is not None and k <= 3 for k in two)
-        shares = [m["share_three_levels_beyond_1_5_m"] for m in merits]
-        entry["three_levels_beyond_1_5_m"] = sum(s is not None and s > 0.9 for s in shares)
+        entry["as_in_the_paper"] = sum(each("as_in_the_paper"))
+        entry["two_levels_within_3_decisions"] = sum(
+            decisions is not None and decisions <= 3 for decisions in each("decisions_to_two_levels")
+        )
+        entry["three_levels_beyond_1_5_m"] = sum(
+            share is not None and share > 0.9 for share in each("share_three_levels_beyond_1_5_m")
+        )
     return entry
 
 

@@ -49,25 +49,29 @@ def _draw_room(axes: Axes, data: RunData) -> None:
     for obstacle in boxes_from_field(data.resolved):
         (x_low, x_high), (y_low, y_high) = obstacle.outline.x_m, obstacle.outline.y_m
         axes.add_patch(Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fc=MUTED, lw=0, zorder=1))
+    _draw_views(axes, data)
+
+
+def _draw_views(axes: Axes, data: RunData) -> None:
+    """Draw the views of fixed cameras at each height, and the boxes of motion capture and ranging systems."""
     for camera in data.resolved.cameras.values():
+        x, y, _ = camera.position_m
         for index, height in enumerate(data.heights_m):
             half_x, half_y = _footprint_half_m(camera, height)
-            x, y, _ = camera.position_m
-            box = Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, fc=_CAMERA, alpha=0.06, lw=0, zorder=0)
-            axes.add_patch(box)
-            axes.add_patch(
-                Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, fill=False, ec=_CAMERA, lw=0.7, ls=":")
-            )
+            _draw_view(axes, (x - half_x, y - half_y), 2 * half_x, 2 * half_y)
             side, ha = (1, "right") if index % 2 == 0 else (-1, "left")  # neighbours do not hide each other
             axes.annotate(f"{height:g} m", (x + side * half_x, y - half_y), xytext=(-3 * side, 3),
                           textcoords="offset points", ha=ha, va="bottom", fontsize=8, color=_CAMERA)  # fmt: skip
     for name, volume in data.resolved.volumes.items():
         (x_low, x_high), (y_low, y_high) = volume.x_m, volume.y_m
-        box = Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fc=_CAMERA, alpha=0.06, lw=0, zorder=0)
-        axes.add_patch(box)
-        axes.add_patch(Rectangle(box.xy, x_high - x_low, y_high - y_low, fill=False, ec=_CAMERA, lw=0.7, ls=":"))
+        _draw_view(axes, (x_low, y_low), x_high - x_low, y_high - y_low)
         axes.annotate(name, (x_low, y_high), xytext=(3, -3), textcoords="offset points", va="top", fontsize=8,
                       color=_CAMERA)  # fmt: skip
+
+
+def _draw_view(axes: Axes, corner: tuple[float, float], width: float, depth: float) -> None:
+    axes.add_patch(Rectangle(corner, width, depth, fc=_CAMERA, alpha=0.06, lw=0, zorder=0))
+    axes.add_patch(Rectangle(corner, width, depth, fill=False, ec=_CAMERA, lw=0.7, ls=":"))
 
 
 def _footprint_half_m(camera: WorldCamera, height_m: float) -> tuple[float, float]:

@@ -29,9 +29,10 @@ def moved(base: Pose, state: Array, seconds: float) -> Pose:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """One board before the camera: poses at mid exposure, and at its begin and end for the smear.
+    """One board before the camera: poses in the middle of the exposure.
 
-    rolling: optical_from_marker when the first and the last row are exposed; None when all rows are at once.
+    begin_m, end_m: its middle [m; camera_optical] at begin and end of the exposure, for the smear. rolling:
+    optical_from_marker when the first and the last row are exposed; None when all rows are at once.
     """
 
     board: BoardSpec
@@ -57,41 +58,68 @@ class CameraScene:
     rolling: tuple[Pose, Pose] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class _Exposure:
+    """A camera's poses (world_from_optical) during an exposure: in the middle, at begin and end (smear).
+
+    rolling: when the first and the last row are exposed; None when all rows are at once. half_s, readout_s: half of the
+    exposure and of the readout [s].
+    """
+
+    half_s: float
+    readout_s: float
+    middle: Pose
+    smear: tuple[Pose, Pose]
+    rolling: tuple[Pose, Pose] | None
+
+
 def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
     """Return the scene before the camera, without its own carrier, bodies behind it, and those of unknown place."""
-    half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
-    camera, *smear = _camera_poses(spec, states, (0.0, -half_s, half_s))
-    rolling = None
-    if readout_s:
-        first, last = _camera_poses(spec, states, (-readout_s, readout_s))
-        rolling = first, last
-    optical_from_world = camera.inverse()
+    exposure = _exposure(spec, states)
+    optical_from_world = exposure.middle.inverse()
     sights = []
     for board in spec.boards:
         state = states[spec.bodies.index(board.body)]
         if board.body == spec.mount.body or math.isnan(state[0]):
             continue
-        base, offset = world_from_base(state), np.array(board.position_m)
-        optical_from_base = optical_from_world.compose(base)
-        optical_from_marker = _shifted(optical_from_base, offset)
-        if max(optical_from_base.translation[2], optical_from_marker.translation[2]) < -_REACH_M:
-            continue
-        place = base.apply(offset)
-        velocity = base.rotation @ _across(state[_RATES], offset) + state[_VELOCITY]
-        begin, end = (
-            (place + seconds * velocity - at.translation) @ at.rotation
-            for at, seconds in zip(smear, (-half_s, half_s), strict=True)
-        )
-        rows = None
-        if rolling is not None:
-            first, last = (
-                _shifted(at.inverse().compose(moved(base, state, seconds)), offset)
-                for at, seconds in zip(rolling, (-readout_s, readout_s), strict=True)
-            )
-            rows = first, last
-        sights.append(Sight(board, optical_from_base, optical_from_marker, begin, end, rows))
+        sight = _sight(board, state, exposure, optical_from_world)
+        if sight is not None:
+            sights.append(sight)
     farthest_first = tuple(sorted(sights, key=lambda sight: -sight.depth_m))
-    return CameraScene(camera, farthest_first, (smear[0], smear[1]), rolling)
+    return CameraScene(exposure.middle, farthest_first, exposure.smear, exposure.rolling)
+
+
+def _exposure(spec: RenderSpec, states: Array) -> _Exposure:
+    half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
+    middle, begin, end = _camera_poses(spec, states, (0.0, -half_s, half_s))
+    rolling = None
+    if readout_s:
+        first, last = _camera_poses(spec, states, (-readout_s, readout_s))
+        rolling = first, last
+    return _Exposure(half_s, readout_s, middle, (begin, end), rolling)
+
+
+def _sight(board: BoardSpec, state: Array, exposure: _Exposure, optical_from_world: Pose) -> Sight | None:
+    """Return a board in the picture; None if its body is behind the camera."""
+    base, offset = world_from_base(state), np.array(board.position_m)
+    optical_from_base = optical_from_world.compose(base)
+    optical_from_marker = _shifted(optical_from_base, offset)
+    if max(optical_from_base.translation[2], optical_from_marker.translation[2]) < -_REACH_M:
+        return None
+    place = base.apply(offset)
+    velocity = base.rotation @ _across(state[_RATES], offset) + state[_VELOCITY]
+    begin, end = (
+        (place + seconds * velocity - at.translation) @ at.rotation
+        for at, seconds in zip(exposure.smear, (-exposure.half_s, exposure.half_s), strict=True)
+    )
+    rows = None
+    if exposure.rolling is not None:
+        first, last = (
+            _shifted(at.inverse().compose(moved(base, state, seconds)), offset)
+            for at, seconds in zip(exposure.rolling, (-exposure.readout_s, exposure.readout_s), strict=True)
+        )
+        rows = first, last
+    return Sight(board, optical_from_base, optical_from_marker, begin, end, rows)
 
 
 def _shifted(pose: Pose, offset: Array) -> Pose:

@@ -39,6 +39,7 @@ from groundstation.estimation.records import (
 )
 from groundstation.estimation.update import correct, note_motion, read, write_outcome
 from groundstation.estimation.verdict import Tested, confirm
+from groundstation.estimation.witnessed import correct_all_but_velocities, is_unwitnessed, note_witness
 from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
@@ -75,12 +76,16 @@ def choose(
 
 
 @kernel(inlined=True)
-def correct_modes(state: State, tables: Tables, used: Hypothesis, excess: float) -> None:
+def correct_modes(state: State, tables: Tables, event: EventRow, used: Hypothesis, excess: float) -> None:
     """Correct all modes that can use the observation, with S raised by `excess`."""
+    teaches = not is_unwitnessed(belief_of(state, tables, 0), event)
     for m in range(state.means.shape[0]):
         if used.innovations[m].nis >= 0.0:
             belief, deferred = belief_of(state, tables, m), deferred_of(state, m)
-            correct(belief, deferred, tables.headings, used.innovations[m], used.HP[m], excess)
+            if teaches:
+                correct(belief, deferred, tables.headings, used.innovations[m], used.HP[m], excess)
+            else:
+                correct_all_but_velocities(belief, deferred, tables.headings, used.innovations[m], used.HP[m], excess)
 
 
 @kernel(inlined=True)
@@ -99,6 +104,7 @@ def note_use(state: State, first: Belief, event: EventRow) -> None:
     subject = state.memory[event.subject]
     forget_noted_error(subject, event.at)
     note_place(first, deferred_of(state, 0), event.subject)
+    note_witness(first, event)
     subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
 
 
@@ -149,7 +155,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
         if not let_join(state, tables, event, rows, used, out):
             return
         excess = 1.0
-    correct_modes(state, tables, used, excess)
+    correct_modes(state, tables, event, used, excess)
     if tested.joins:
         make_all(state)  # a diffuse prior is too wide for deferred corrections beside it
     weigh(state.weights, used.innovations, tested.rows, excess)

@@ -36,7 +36,10 @@ NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED, OBSERVER_UNCONFIRMED, CONTRADICTED, OBS
 TURNED = 15
 
 # Entries of a block that other entities' models may need; EntityRow has their indices.
-SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "range_scale", "bearing_bias")
+SHARED_LABELS = (
+    "z", "yaw", "roll_error", "pitch_error", "velocity_bias_x", "velocity_bias_y", "yaw_offset", "range_bias",
+    "range_scale", "bearing_bias",
+)  # fmt: skip
 
 
 class EntityRow(Record):
@@ -57,6 +60,8 @@ class EntityRow(Record):
     at_yaw: int
     at_roll_error: int
     at_pitch_error: int
+    at_velocity_bias_x: int
+    at_velocity_bias_y: int
     at_yaw_offset: int
     at_range_bias: int
     at_range_scale: int
@@ -119,7 +124,8 @@ class EntityMemory(Record):
     time predicted since the last sighting. wild: observations far beyond the gate; wild_x, _y: where the last of them
     puts it, relative to its belief [m; world]; astray: landmarks read far beyond the gate; refused: observations by
     which it would have joined if they had not contradicted their observer; corrected_at: last use of an observation;
-    seen_variance: of the worse of x and y [m^2] right after it. gave_up, gave_up_at, gave_up_whom: number of robots
+    seen_variance: of the worse of x and y [m^2] right after it; witnessed_at: when somebody who is seen, or is fixed,
+    last saw it. gave_up, gave_up_at, gave_up_whom: number of robots
     recently re-initialised by this one's sightings, the last time, and the last robot.
     """
 
@@ -160,6 +166,8 @@ class EntityMemory(Record):
     refused: Streak
     corrected_at: float
     seen_variance: float
+    witnessed_at: float
+    witness: int
     gave_up_at: float
     gave_up_whom: int
     gave_up: float

@@ -10,6 +10,7 @@ from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import Measurement, OdometrySample
 from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, MountedCamera, OdometryRobot
 from groundstation.estimation.models.odometry_robot import SLOW_STATES
+from groundstation.estimation.models.protocol import MotionModel
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 
 MS, START = 1_000_000, 10_000_000_000_000
@@ -36,10 +37,11 @@ def sighting(observer: str, seen_from: Array, subject: str, place: Array, now_ns
 
 def flown(lies_m_s: float, seen: tuple[str, ...]) -> FixedLagFilter:
     """Return the filter after a flight in which all hover; one's velocity lies from when it is not seen on."""
-    entities = dict.fromkeys(PLACES, DRONE) | {"target": ConstantVelocityTarget()}
-    ceiling = {"ceiling": FixedMount((0.0, 0.0, 4.2), 0.0035, 0.01)}
+    ceiling = FixedMount((0.0, 0.0, 4.2), 0.0035, 0.01)
+    entities: dict[str, MotionModel] = {"target": ConstantVelocityTarget(), "ceiling": ceiling}
+    entities |= dict.fromkeys(PLACES, DRONE)
     sensors = {name: MountedCamera(name, WORLD_FROM_DOWN) for name in ("ceiling", *PLACES)}
-    joint = FixedLagFilter(EstimatorParameters(entities | ceiling, sensors))
+    joint = FixedLagFilter(EstimatorParameters(entities, sensors))
     for name in PLACES:
         joint.set_airborne(name, True, START, START)
     for step in range(1, round(END_S * 100)):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from drivers.failsafe_table import RESUME_NEEDED, Condition, Failsafe, Latch, Reaction
 from drivers.setpoints import SetpointGate
+from drivers.telemetry_return import TelemetryReturn
 from drivers.watchdog_types import DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, UP, FlightState
 from groundstation.time_units import NS_PER_S
@@ -94,6 +95,8 @@ def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
         holding[Condition.BLIND] = vehicle.silence
     if not vehicle.fresh:
         holding[Condition.TELEMETRY_SILENT] = vehicle.silence
+        if vehicle.unsound or vehicle.mute:
+            holding[Condition.SENSORS_WRONG] = vehicle.silence
         return
     if state is FlightState.EMERGENCY and not at.clearing:
         holding[Condition.EMERGENCY] = ""
@@ -202,6 +205,7 @@ class Evidence:
         self._strayed_ns: int | None = None  # since the last order
         self._strayed_by = ""  # which velocity
         self._obeyed = False  # since then
+        self._return = TelemetryReturn()
 
     def step(self, at: Situation, limits: WatchdogLimits) -> None:
         """Take the situation of one turn."""
@@ -226,6 +230,7 @@ class Evidence:
             for condition, pardoned_s in self._pardoned_s.items()
             if condition in self.charged_s
         }
+        self._observe_silence(at, limits)
 
     def _observe_return(self, at: Situation, limits: WatchdogLimits) -> None:
         """Note that it strays once more soon after it began to; one push shows twice: by report, later by cameras."""
@@ -236,6 +241,16 @@ class Evidence:
             self._strayed_ns, self._strayed_by, self._obeyed = at.now_ns, stray_by, False
         elif self._obeyed and stray_by == self._strayed_by:
             self.holding[Condition.STRAYS_AGAIN] = stray
+
+    def _observe_silence(self, at: Situation, limits: WatchdogLimits) -> None:
+        """Note what a silence of the telemetry leads to; if a part of it was wrong values, all of it counts as that."""
+        silent = Condition.TELEMETRY_SILENT
+        charged_s = self.charged_s.get(silent, 0.0)
+        if self._return.is_doubted(charged_s, at.vehicle) and silent in self.holding:
+            self.holding.setdefault(Condition.SENSORS_WRONG, self.holding[silent])
+            self.charged_s[Condition.SENSORS_WRONG] = max(charged_s, self.charged_s.get(Condition.SENSORS_WRONG, 0.0))
+        lasted_s = charged_s - self._pardoned_s.get(silent, 0.0)
+        self.holding |= self._return.step(at.now_ns, lasted_s, at.mode is DriverMode.TRACK, at.vehicle, limits)
 
     def against_s(self, row: Failsafe) -> float | None:
         """Return how long a row's condition has lasted [s]: since the last order that ends the row, if one does."""
@@ -288,7 +303,9 @@ class Evidence:
         """Begin anew with all conditions, for a take-off."""
         self.charged_s.clear()
         self._pardoned_s.clear()
+        self._return.forget()
 
     def pardon(self) -> None:
         """Begin anew for the rows that an order to go on ends; their conditions go on counting for all others."""
         self._pardoned_s = dict(self.charged_s)
+        self._return.forget()

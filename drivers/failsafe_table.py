@@ -42,6 +42,9 @@ class Condition(StrEnum):
     SUPERVISOR_SILENT = auto()
     BLIND = auto()
     TELEMETRY_SILENT = auto()
+    SENSORS_WRONG = auto()
+    TELEMETRY_BACK = auto()
+    BACK_IN_DOUBT = auto()
     STATE_UNKNOWN = auto()
     NOT_STANDING = auto()
     BATTERY_LOW = auto()
@@ -204,7 +207,9 @@ def _suspensions(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.DRIVER_STOOD, "this driver stood still for {why}", 0.0, None),
         (Condition.SUPERVISOR_DEAD, "the supervisor is dead", 0.0, None),
         (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", limits.resume_within_s, SLOWLY),
-        (Condition.TELEMETRY_SILENT, "{why}", limits.resume_within_s, SLOWLY),
+        # A radio that paused says nothing against vehicle, tracker or supervisor: see TELEMETRY_BACK.
+        (Condition.SENSORS_WRONG, "{why}", limits.resume_within_s, SLOWLY),
+        (Condition.BACK_IN_DOUBT, "its telemetry is back, but {why}", 0.0, None),
         (Condition.STATE_UNKNOWN, "the vehicle does not say what it does", _NOTICED_S, SLOWLY),
         (Condition.TRACKER_RESTARTED, "the tracker restarted", 0.0, None),
         (Condition.TRACKER_PAUSED, "the tracker sends it no velocity", limits.tracker_resume_within_s, None),
@@ -223,6 +228,7 @@ def _brakes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     rows = (
         (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", 0.0),
         (Condition.TELEMETRY_SILENT, "{why}", 0.0),
+        (Condition.TELEMETRY_BACK, "its telemetry is back, and has to last for {why}", 0.0),
         (Condition.NO_SETPOINT, "the tracker sends it no velocity", 0.0),
         (Condition.UNCONVERGED, _UNCONVERGED, 0.0),
         (Condition.UNLOCATED, "no position {why}", limits.lost_hover_s),

@@ -26,6 +26,12 @@ EVIDENCE: dict[Condition, str] = {
     Condition.SUPERVISOR_SILENT: "no heartbeat of the supervisor for 0.3 s",
     Condition.BLIND: "a BAD sensor, the IMU excepted, while cameras do not show how fast it is",
     Condition.TELEMETRY_SILENT: "no telemetry for 0.3 s, or a BAD sensor",
+    Condition.SENSORS_WRONG: "a BAD sensor, or telemetry without its motion; a silence with a BAD sensor in it "
+    "counts in full",
+    Condition.TELEMETRY_BACK: "telemetry has lasted for less than 1.5 s without a pause of 0.3 s, after a "
+    "`telemetry_silent` of 1.0 s since the last order to go on",
+    Condition.BACK_IN_DOUBT: "likewise, for the fourth time within 60 s, no such order since; or after those 1.5 s in "
+    "a mode that is not ours (MAVLink)",
     Condition.STATE_UNKNOWN: "its state is UNKNOWN or LOST",
     Condition.NOT_STANDING: "its state is neither LANDED nor EMERGENCY",
     Condition.BATTERY_LOW: "battery below `limits.battery_min`",

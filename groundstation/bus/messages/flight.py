@@ -40,7 +40,7 @@ _ALOFT = frozenset({"HOVER", "TRACK", "HOLD", "LANDING"})
 NOT_DOWN = frozenset({"flies_away", "landing_overdue", "stands_running"})
 # Values of VehicleStatus.failsafe with which the tracker may bring a hovering vehicle back to its place: none, or one
 # that casts no doubt on what the vehicle does, nor on the tracker.
-KEPT_IN_PLACE = frozenset({"", "driver_stood", "supervisor_silent", "telemetry_silent", "state_unknown"})
+KEPT_IN_PLACE = frozenset({"", "driver_stood", "supervisor_silent", "sensors_wrong", "back_in_doubt", "state_unknown"})
 
 
 def known_state(before: FlightState, said: FlightState) -> FlightState:

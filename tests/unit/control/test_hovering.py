@@ -138,7 +138,7 @@ def test_a_further_order_holds_the_place_of_that_moment():
     assert math.dist(there, flight.place) < 0.01
 
 
-@pytest.mark.parametrize("failsafe", ["driver_stood", "telemetry_silent"])
+@pytest.mark.parametrize("failsafe", ["driver_stood", "sensors_wrong"])
 def test_a_drone_that_waits_for_resume_after_a_pause_is_held(failsafe):
     flight = Flight(drift=(0.05, 0.0))
     flight.hovering.take(status("HOVER", failsafe=failsafe), flight.now_ns)

@@ -13,10 +13,10 @@ def stand_still(bench):
     bench.step(dt=700 * MS)
 
 
-def fall_silent(bench):
-    bench.fresh = False
+def report_nonsense(bench):
+    bench.unsound = "its velocity is stuck at 0.00 m/s"
     bench.run(1.2)
-    bench.fresh = True
+    bench.unsound = ""
 
 
 def lose_the_supervisor(bench):
@@ -33,7 +33,7 @@ def stray(bench):
 
 STOPS = {
     "this driver stood still for 0.7 s": stand_still,
-    "no telemetry from the vehicle": fall_silent,
+    "its sensors cannot be believed: its velocity is stuck at 0.00 m/s": report_nonsense,
     "the supervisor does not answer": lose_the_supervisor,
     "it does not do what it is told: 1.0 m/s seen by cameras, 0.0 m/s asked": stray,
 }
@@ -83,8 +83,8 @@ def test_the_fault_itself_still_lands_it_sooner_and_is_named(new_bench):
     bench = new_bench().fly()
     bench.fresh = False
     bench.run(1.5)
-    assert bench.watchdog.mode is DriverMode.HOVER
-    assert bench.watchdog.explanation == "no telemetry from the vehicle", "RESUME would be refused"
+    assert bench.watchdog.mode is DriverMode.TRACK and bench.watchdog.braked
+    assert bench.watchdog.explanation == "hovers: no telemetry from the vehicle", "RESUME would be refused"
     assert bench.run(1.5)[-1] is Action.LAND
 
 

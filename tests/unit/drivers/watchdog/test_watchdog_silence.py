@@ -202,7 +202,7 @@ def test_sigterm_lands_at_once(new_bench):
     assert bench.step().action is Action.LAND
 
 
-def test_silent_telemetry_hovers_needs_resume_and_lands(new_bench):
+def test_silent_telemetry_hovers_and_lands_and_an_order_shortens_the_wait_after_it(new_bench):
     bench = new_bench().fly()
     bench.fresh = False
     assert set(bench.run(1.2)) == {Action.HOVER}

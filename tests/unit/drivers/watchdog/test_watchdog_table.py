@@ -246,12 +246,12 @@ def test_no_sequence_of_inputs_flies_after_land_without_a_take_off():
 def test_the_row_that_acted_is_named_until_the_mode_ends(new_bench):
     bench = new_bench().fly()
     assert bench.watchdog.failsafe == ""
-    bench.fresh = False
+    bench.unsound = "its velocity is stuck at 0.00 m/s"
     bench.run(1.2)
-    assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.HOVER, Condition.TELEMETRY_SILENT)
+    assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.HOVER, Condition.SENSORS_WRONG)
     bench.run(2.0)
     assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.LANDING, Condition.TELEMETRY_SILENT)
-    bench.fresh, bench.state = True, FlightState.LANDED
+    bench.unsound, bench.state = "", FlightState.LANDED
     bench.step()
     assert (bench.watchdog.mode, bench.watchdog.failsafe) == (DriverMode.LANDED, "")
 

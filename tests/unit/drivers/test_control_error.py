@@ -124,6 +124,32 @@ def test_a_velocity_that_is_lost_for_a_moment_does_not_come_back_as_a_stray(how)
     assert strays[round(1.5 / TURN_S)] and not any(strays[round(1.62 / TURN_S) :])
 
 
+def after_a_silence(silent_s, answer, period_s=math.inf):
+    """Return when one strays that flew at 0.6 m/s and was told to hover when it fell silent [s]; None: never."""
+    monitor = ControlErrorMonitor()
+    for turn in range(round(8.0 / TURN_S)):
+        at_s = turn * TURN_S - 2.0
+        silent = at_s > 0.0 and at_s % period_s < silent_s
+        command = told(0.6) if at_s < 0.0 else told(action=Action.HOVER)
+        reported = view(answer(max(0.0, at_s - silent_s)))._replace(fresh=not silent)
+        if monitor.judge(turn * round(TURN_S * S) + S, reported, command, None).stray:
+            return at_s
+    return None
+
+
+def test_one_that_was_not_heard_has_time_to_brake_as_it_may_not_have_heard():
+    assert after_a_silence(1.4, lambda at_s: 0.6 * math.exp(-at_s / 0.8)) is None
+
+
+@pytest.mark.parametrize("silent_s", [0.4, 1.4, 2.4])
+def test_one_that_flies_on_after_a_silence_strays(silent_s):
+    assert silent_s < after_a_silence(silent_s, lambda at_s: 0.6) < silent_s + 1.3
+
+
+def test_short_silences_hide_nothing():
+    assert after_a_silence(0.4, lambda at_s: 0.6, period_s=1.0) < 3.0
+
+
 def test_it_is_over_when_the_vehicle_obeys():
     monitor, strays = ControlErrorMonitor(), []
     for turn in range(400):

@@ -141,7 +141,7 @@ def test_one_that_was_not_heard_has_time_to_brake_as_it_may_not_have_heard():
     assert after_a_silence(1.4, lambda at_s: 0.6 * math.exp(-at_s / 0.8)) is None
 
 
-@pytest.mark.parametrize("silent_s", [0.4, 1.4, 2.4])
+@pytest.mark.parametrize("silent_s", [1.4, 2.4])
 def test_one_that_flies_on_after_a_silence_strays(silent_s):
     assert silent_s < after_a_silence(silent_s, lambda at_s: 0.6) < silent_s + 1.3
 

@@ -195,6 +195,49 @@ def test_a_resume_in_between_is_refused_or_undone_by_a_named_row_only(new_bench,
         judge(fly(new_bench(), DriverMode.TRACK), [DEVIATIONS[name]], resume_s)
 
 
+# A pause of the radio, and what else may be wrong before, in or after it, or for a while only.
+RADIO_S, SOUND_S = 2.0, 1.5
+REPORTS = {"fresh", "unsound", "state", "homeward"}
+WHILES = [(0.0, LONG_S), (1.0, LONG_S), (RADIO_S, LONG_S), (0.6, 2.6), (2.2, 3.4)]
+# What waits for an order once it has lasted for 1.2 s, though it is over.
+WAITS = {"supervisor frozen", "no setpoints", "state UNKNOWN", "state LOST", "it strays", "too fast", "told to stop"}
+
+
+def pause_of_the_radio(bench, one, begin_s, end_s):
+    """Fly with a silence of 2 s, and another deviation for a while; yields (seconds, decision)."""
+    usual = {name: getattr(bench, name) for name in one.values}
+    for turn in range(round(LONG_S / TURN_S)):
+        now_s = turn * TURN_S
+        on = begin_s <= now_s < end_s and one.is_on(turn)
+        for name, value in (one.values if on else usual).items():
+            setattr(bench, name, value)
+        if "fresh" not in one.values or not on:
+            bench.fresh = now_s >= RADIO_S
+        yield now_s, bench.step(round(TURN_S * S))
+
+
+@pytest.mark.parametrize(("begin_s", "end_s"), WHILES)
+@pytest.mark.parametrize("name", DEVIATIONS)
+def test_after_a_pause_of_the_radio_it_goes_on_only_if_nothing_else_was_wrong(new_bench, name, begin_s, end_s):
+    one, bench = DEVIATIONS[name], fly(new_bench(), DriverMode.TRACK)
+    lasts, stopped = end_s == LONG_S, False
+    shown_s = max(begin_s, RADIO_S) if REPORTS & one.values.keys() else begin_s
+    for now_s, decision in pause_of_the_radio(bench, one, begin_s, end_s):
+        case = (round(now_s, 1), decision)
+        if 0.0 < now_s < RADIO_S + SOUND_S:
+            assert decision.action is not Action.FLY, case
+        if lasts and one.hover_s is not None and now_s >= max(shown_s + one.hover_s, RADIO_S):
+            assert decision.action is not Action.FLY, case
+        if lasts and one.land_s is not None and now_s >= shown_s + one.land_s:
+            assert decision.action in DOWN, case
+        assert not stopped or decision.action in DOWN, case
+        stopped = decision.action in DOWN
+    if not lasts and name in WAITS:
+        assert bench.decision.mode is not DriverMode.TRACK, "it went on by itself"
+    if one.hover_s is None and one.land_s is None and "fresh" not in one.values:
+        assert bench.decision.action is Action.FLY, "nothing was wrong enough to stop"
+
+
 # A RESUME after a pause, or the adoption of another tracker, ends that.
 PERSISTENT = [name for name, one in DEVIATIONS.items() if one.land_s is not None and not {*one.conditions} & {*TRACKER}]
 

@@ -206,6 +206,19 @@ def unheard_vehicle_brakes(case: Case) -> None:
 
 
 @check("unheard")
+def pause_of_the_radio_ends_in_a_hover(case: Case) -> None:
+    """After a silence of 1.6 s it is commanded to hover until it has been heard for a while."""
+    still(case, "heard in time")
+
+
+@check("unheard")
+def pause_of_the_radio_is_survived(case: Case) -> None:
+    """Then setpoints count again without an order."""
+    assert _modes(case, "goes on") == {"TRACK"}, f"modes {_modes(case, 'goes on')}"
+    assert case.record.motion("goes on")[-1].speed > 0.15, "it stands"
+
+
+@check("unheard")
 def unheard_vehicle_is_lost(case: Case) -> None:
     """A vehicle that falls silent is called LOST."""
     said = [one.message.flight_state for one in case.record.heard(VEHICLE_STATUS, "silent vehicle")]

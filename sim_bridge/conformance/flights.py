@@ -201,8 +201,13 @@ def _orphaned(bench: Bench) -> None:
 
 @script()
 def _unheard(bench: Bench) -> None:
-    """The vehicle sends nothing any more, and still receives."""
+    """The vehicle sends nothing for a while, then for good, and still receives."""
     track_ahead(bench)
+    bench.emulator.silent = True
+    bench.spend("radio pauses", 1.6)
+    bench.emulator.silent = False
+    bench.spend("heard in time", 1.0)
+    bench.spend("goes on", 2.0)
     bench.emulator.silent = True
     bench.spend("silent vehicle", 1.5)
     bench.await_landing("landing unheard")

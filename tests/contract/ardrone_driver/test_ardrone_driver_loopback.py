@@ -167,7 +167,7 @@ def test_a_restarted_driver_lands_a_flying_drone_and_never_starts_a_standing_one
     assert rig.decision.mode == "LANDED" and not rig.fake.state & FLY
 
 
-def test_a_silent_drone_is_asked_again_and_nothing_moves_after_it_comes_back(rig):
+def test_a_silent_drone_is_asked_again_and_goes_on_once_it_has_been_heard_for_a_while(rig):
     rig.take_off()
     rig.track()
     rig.speaking, requests = False, rig.fake.requests
@@ -185,9 +185,9 @@ def test_a_silent_drone_is_asked_again_and_nothing_moves_after_it_comes_back(rig
     for _ in range(10):
         rig.turn()
     assert rig.fake.requests > requests, "navdata was asked for again"
-    assert rig.decision.mode == "HOVER" and set(rig.fake.said("PCMD")[-5:]) == {"0,0,0,0,0"}
-    rig.order(Verb.RESUME)
+    assert rig.decision.action == "HOVER" and set(rig.fake.said("PCMD")[-5:]) == {"0,0,0,0,0"}
     rig.until(lambda: rig.decision.action == "FLY")
+    assert rig.decision.mode == "TRACK"
 
 
 def test_a_command_for_somebody_else_is_not_answered(rig):

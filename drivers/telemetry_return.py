@@ -8,18 +8,20 @@ from groundstation.time_units import NS_PER_S
 class TelemetryReturn:
     """Call `is_doubted` and `step` once a turn, `forget` at an order to go on.
 
-    A silence is long from `resume_within_s` on; a shorter one ends with its first packet.
+    A silence is long from `sound_after_s` on, and counts from `resume_within_s` on; a shorter one ends with its first
+    packet.
     """
 
     def __init__(self) -> None:
         self._doubted = False
-        self._long = False
+        self._long = self._counted = False
         self._back_ns: int | None = None
         self._times_ns: list[int] = []
 
     def forget(self) -> None:
         """Begin anew: an order to go on ends the wait, and permits as many returns as ever."""
-        self._long, self._back_ns, self._times_ns = False, None, []
+        self._long = self._counted = False
+        self._back_ns, self._times_ns = None, []
 
     def is_doubted(self, charged_s: float, vehicle: VehicleView) -> bool:
         """Return whether values that cannot be true came in the present silence; charged_s: its duration, 0: none."""
@@ -33,11 +35,12 @@ class TelemetryReturn:
 
         tracks: its mode is TRACK; only in that is there anything to go on with.
         """
-        self._long = self._long and tracks
+        self._long, self._counted = self._long and tracks, self._counted and tracks
         if not vehicle.fresh:
             self._back_ns = None
-            if tracks and not self._long and lasted_s >= limits.resume_within_s:
-                self._long = True
+            self._long = tracks and (self._long or lasted_s >= limits.sound_after_s)
+            if self._long and not self._counted and lasted_s >= limits.resume_within_s:
+                self._counted = True
                 self._times_ns.append(now_ns)
         if not (vehicle.fresh and self._long):
             return {}
@@ -45,6 +48,7 @@ class TelemetryReturn:
         settled = now_ns - self._back_ns >= limits.sound_s * NS_PER_S
         doubt = self._doubt(now_ns, settled, vehicle, limits)
         self._long = not settled or bool(doubt)
+        self._counted = self._counted and self._long
         if doubt:
             return {Condition.BACK_IN_DOUBT: doubt}
         return {Condition.TELEMETRY_BACK: f"{limits.sound_s:g} s"} if self._long else {}

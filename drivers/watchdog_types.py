@@ -51,9 +51,10 @@ REFUSABLE = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop
 class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
-    resume_within_s: a longer silence of the supervisor, or of a vehicle with wrong values, needs a RESUME; after one of
-    a sound vehicle's radio it goes on once its telemetry has lasted for sound_s, returns_most times within
-    returns_within_s. tracker_resume_within_s: likewise a silence of the tracker, or of any part between it and here;
+    resume_within_s: a longer silence of the supervisor, or of a vehicle with wrong values, needs a RESUME.
+    sound_after_s: after a longer one of a sound vehicle's radio it goes on once its telemetry has lasted for sound_s;
+    after one of resume_within_s returns_most times within returns_within_s. tracker_resume_within_s: a longer silence
+    of the tracker, or of any part between it and here, needs a RESUME; likewise
     gap_s: a pause of our own loop. unresumed_land_s: it lands if no RESUME comes for so long (after a pause of the
     tracker: land_after_s). cut_s: it may fly on after an order to cut its motors. brake_s: hover before landing
     when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise explain while
@@ -79,6 +80,7 @@ class WatchdogLimits:
     battery_min: float = 0.15
     battery_hold_s: float = 3.0
     resume_within_s: float = 1.0
+    sound_after_s: float = 0.5
     sound_s: float = 1.5
     returns_most: int = 3
     returns_within_s: float = 60.0

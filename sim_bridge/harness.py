@@ -13,7 +13,7 @@ from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from sim_bridge.cameras import render_specs
 from sim_bridge.devices.captured_bodies import CapturedBodies
-from sim_bridge.devices.natnet import NatnetEmulator
+from sim_bridge.devices.natnet import MULTICAST_GROUP, NatnetEmulator
 from sim_bridge.devices.odometry_router import OdometryRouter
 from sim_bridge.devices.pose_router import PoseRouter
 from sim_bridge.devices.range_gateway import RangeGateway
@@ -148,8 +148,12 @@ class Harness:
         system = order.site.motion_capture[name]
         faults = order.scenario.faults
         seen = CapturedBodies(name, system, world.bodies, world.states, rng, faults, errors)
-        server = (PoseRouter if system.source.startswith("ros2://") else NatnetEmulator)(name, place, seen)
-        self._stage.add(name, server, server.fileno())
+        if system.source.startswith("ros2://"):
+            router = PoseRouter(name, place, seen)
+            self._stage.add(name, router, router.fileno())
+        else:
+            server = NatnetEmulator(name, place, seen, MULTICAST_GROUP if order.scenario.natnet_multicast else "")
+            self._stage.add(name, server, server.fileno())
 
     @property
     def _inventory(self) -> str:

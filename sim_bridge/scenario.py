@@ -215,6 +215,9 @@ class CommonScenario(Section):
     """Parts of the floor over which optical flow is off."""
     link_bursts: LinkBursts = LinkBursts()
     """Random times without a radio link, for each vehicle."""
+    natnet_multicast: bool = False
+    """Whether emulated NatNet systems send frames to Motive's multicast group, on this host only, instead of to each
+    client. Not while a program here follows a real Motive."""
     expected: ScenarioExpectation | None = None
     """How `groundstation experiment scenarios` flies it, and the results it must have; the simulator does not read
     it."""

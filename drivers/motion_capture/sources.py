@@ -66,7 +66,7 @@ def open_source(address: SystemAddress) -> Source:
 
 
 class NatnetSource:
-    """A NatNet client: one socket for requests and for frames to this client alone, one more for multicast frames."""
+    """A NatNet client: one socket for requests and frames to it alone, one for frames to a group or the data port."""
 
     def __init__(self, address: SystemAddress) -> None:
         self.rejected: Counter[str] = Counter()
@@ -79,6 +79,7 @@ class NatnetSource:
         self._names: dict[int, str] = {}
         self._named = False  # else names are missing, or may belong to other bodies by now: no frame is used
         self._lacks_name, self._changed, self._clock = False, False, ClockWatch()
+        self._last = (-1, 0)  # number and ticks of the last frame
         self._looked_up_ns = self._asked_ns = self._alive_ns = self._framed_ns = 0
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
@@ -160,14 +161,17 @@ class NatnetSource:
     def _greet(self, server: natnet.Server) -> None:
         before, self._server, self.detail = self._server, server, ""
         moved = before is None or (before.group, before.data_port) != (server.group, server.data_port)
+        silent = self._is_silent(clock.now_ns())
         # A system that was restarted may send elsewhere; an adapter that was unplugged has left the group.
-        if moved or self._is_silent(clock.now_ns()):
+        if moved or silent:
             self._leave()
-        if server.group and self._frames is None:
+        # WIRE (docs/reference/natnet.md 1): frames to one client may come to the port that asked or to the data port.
+        # Other programs of this host may want the latter: it is opened only while nothing comes to the former.
+        if self._frames is None and (server.group or (silent and not moved)):
             try:
-                self._frames = self._join(server.group, server.data_port)
+                self._frames = self._opened(server.group, server.data_port)
             except OSError as error:  # a port taken by another program, or an invalid address: tried again
-                place = f"{server.group}:{server.data_port}"
+                place = f"{server.group or 'port'}:{server.data_port}"
                 self.detail = f"its frames cannot be taken at {place}: {error.strerror or error}"
 
     def _leave(self) -> None:
@@ -175,22 +179,29 @@ class NatnetSource:
             self._frames.close()
         self._frames = None
 
-    def _join(self, group: str, port: int) -> socket.socket:
-        with ExitStack() as unless_joined:
-            frames = unless_joined.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+    def _opened(self, group: str, port: int) -> socket.socket:
+        with ExitStack() as unless_opened:
+            frames = unless_opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
             frames.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             frames.setblocking(False)
             frames.bind(("", port))
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
-                route.connect((self._host.found[0], self._port))  # the interface that leads to the system
-                local = route.getsockname()[0]
-            membership = socket.inet_aton(group) + socket.inet_aton(local)
-            frames.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-            unless_joined.pop_all()
+            if group:
+                self._join(frames, group)
+            unless_opened.pop_all()
         return frames
 
+    def _join(self, frames: socket.socket, group: str) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
+            route.connect((self._host.found[0], self._port))  # the interface that leads to the system
+            local = route.getsockname()[0]
+        membership = socket.inet_aton(group) + socket.inet_aton(local)
+        frames.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+
     def _captured(self, frame: natnet.Frame, server: natnet.Server) -> CapturedFrame | None:
-        now_ns = clock.now_ns()
+        now_ns, came_by_the_other_port = clock.now_ns(), frame.sent and (frame.number, frame.sent) == self._last
+        self._last = frame.number, frame.sent
+        if came_by_the_other_port:
+            return None
         # A restarted system may name its bodies differently; how long one keeps the mark of a change is unknown.
         if (frame.changed and not self._changed) or self._is_silent(now_ns):
             self._named = False

@@ -8,11 +8,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 COMMAND_PORT = 1510
-CONNECT, SERVER_INFO, REQUEST_DESCRIPTIONS, DESCRIPTIONS, FRAME, KEEP_ALIVE = 0, 1, 4, 5, 7, 10
+CONNECT, SERVER_INFO, REQUEST, RESPONSE, REQUEST_DESCRIPTIONS, DESCRIPTIONS, FRAME = 0, 1, 2, 3, 4, 5, 7
+DISCONNECT, KEEP_ALIVE, ECHO_REQUEST, ECHO_RESPONSE, DISCOVERY, UNRECOGNIZED = 9, 10, 12, 13, 14, 100
 Version = tuple[int, int]
 _OLDEST, _SIZED, _TURNED = (3, 0), (4, 1), (4, 2)
 """Since 4.1 each section is preceded by its size, since 4.2 the offset of a body has a rotation."""
-_HEAD, _COUNT = struct.Struct("<HH"), struct.Struct("<i")
+_HEAD, _COUNT, _STAMP = struct.Struct("<HH"), struct.Struct("<i"), struct.Struct("<Q")
 _BODY = struct.Struct("<i3f4ffh")
 _SERVER = struct.Struct("<256s4B4BQH?4B")
 _TAIL = {False: struct.Struct("<dQQQhi"), True: struct.Struct("<dQQQIIhi")}
@@ -82,6 +83,11 @@ def message_of(datagram: bytes) -> tuple[int, bytes]:
 def encode(kind: int, payload: bytes = b"") -> bytes:
     """Return a datagram."""
     return _HEAD.pack(kind, len(payload)) + payload
+
+
+def encode_echo(request: bytes, received: int) -> bytes:
+    """Return the answer to an echo request: the client's own stamp, and the server's ticks at its arrival."""
+    return encode(ECHO_RESPONSE, request[: _STAMP.size].ljust(_STAMP.size, b"\0") + _STAMP.pack(received))
 
 
 def connect_request() -> bytes:

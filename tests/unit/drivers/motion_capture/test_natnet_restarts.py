@@ -28,9 +28,10 @@ class Motive:
         self.socket.bind((HOST, 0))
         self.socket.setblocking(False)
         self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(HOST))
-        self.server = natnet.Server("Motive", (4, 1), TICKS_PER_S, 1511, "")
+        self.ports = [free_port(HOST, kind=socket.SOCK_DGRAM) for _ in range(2)]
+        self.server = natnet.Server("Motive", (4, 1), TICKS_PER_S, self.ports[0], "")
         self.client: tuple[str, int] | None = None
-        self.started_ns, self.ports = 0, [free_port(HOST, kind=socket.SOCK_DGRAM) for _ in range(2)]
+        self.started_ns, self.data_port_only = 0, False
         self.source = NatnetSource(parse_source(f"natnet://{HOST}:{self.socket.getsockname()[1]}"))
 
     def answer(self) -> None:
@@ -60,7 +61,9 @@ class Motive:
         )
 
     def send(self, datagram: bytes) -> None:
-        to = (self.server.group, self.server.data_port) if self.server.group else self.client
+        to = self.client
+        if self.server.group or self.data_port_only:
+            to = (self.server.group or HOST, self.server.data_port)
         if to is not None and not self.gone:
             self.socket.sendto(datagram, to)
 
@@ -176,3 +179,26 @@ def test_a_group_that_the_host_has_left_is_joined_again(motive: Motive) -> None:
     frames.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)  # as the host does without the adapter
     motive.run(250)
     assert len(motive.run(50)) >= 48
+
+
+def test_frames_to_the_data_port_of_this_host_are_taken_where_none_come_to_the_port_that_asked(motive: Motive) -> None:
+    motive.data_port_only = True
+    motive.run(250)
+    assert len(motive.run(50)) >= 48 and motive.source.detail == ""
+    assert motive.source._frames is not None
+    motive.data_port_only = False  # a datagram on each way is one frame
+    for _ in range(10):
+        motive.now_ns += 10 * MS
+        datagram = motive.frame()
+        motive.send(datagram)
+        motive.socket.sendto(datagram, (HOST, motive.server.data_port))
+        assert len(motive.source.poll(0.0)) == 1
+
+
+def test_a_data_port_that_another_program_has_is_told_while_no_frame_comes(motive: Motive) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((HOST, motive.server.data_port))
+        motive.data_port_only = True
+        assert motive.run(250) == [] and f"cannot be taken at port:{other.getsockname()[1]}" in motive.source.detail
+        motive.data_port_only = False
+        assert len(motive.run(100)) >= 75 and motive.source.detail == ""

@@ -90,6 +90,8 @@ async def fly_with_mavsdk(port, ardupilot):
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_mavsdk_flies_our_vehicle(hangar, port, flavour):
     emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
+    # Without one an armed PX4 refuses Hold, to which MAVSDK's offboard.stop switches.
+    emulator.firmware.origin = (473977420, 85455940, 488_000)
     facts = asyncio.run(fly_with_mavsdk(port, flavour == "ardupilot"))
     assert facts["autopilot"] == (2 if flavour == "ardupilot" else 1)
     assert facts["version"] == (4 if flavour == "ardupilot" else 1)

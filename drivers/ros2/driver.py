@@ -19,6 +19,7 @@ from drivers.ros2.link import Ros2Link
 from drivers.ros2.names import Order
 from drivers.ros2.settings import FASTEST_M_S, Ros2DriverSettings
 from drivers.ros2.succession import Succession
+from drivers.ros2.twist_axes import TwistAxes
 from drivers.watchdog_types import REFUSABLE, Action, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
@@ -38,6 +39,7 @@ _LASTS_NS = 5 * NS_PER_S
 _ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
 _HEIR = "another publisher took over in flight, "
 _UNTOLD = "without odometry nothing tells whether its motors stopped; stay away"
+_ROOM_AXES = "in the axes of the room, not in the vehicle's own"
 LIMITS = PlausibilityLimits(speed_m_s=FASTEST_M_S, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
@@ -57,7 +59,7 @@ class Ros2Vehicle:
         self._cut_order = CutOrder()
         self._heard_ns = self._charge_ns = 0
         self._succession = Succession(settings.limits, settings.ros2.standing_z_m)
-        self._battery_tie = PublisherTie(_CHARGE_NS)
+        self._battery_tie, self._axes = PublisherTie(_CHARGE_NS), TwistAxes()
         self._charge, self._rate_hz = 0.0, 0.0
         self._refused, self._standing, self._height_m, self._was_ordered = "", "", 0.0, False
         self._velocity: Vector3 = (0.0, 0.0, 0.0)
@@ -91,7 +93,8 @@ class Ros2Vehicle:
                 self._refused = _HEIR + broken
             return
         self._take(now_ns, message)
-        self._succession.take(now_ns, publisher, message)
+        if self._succession.take(now_ns, publisher, message):
+            self._axes = TwistAxes()
         self._refused = ""
 
     def _take_charge(self, now_ns: int, payload: bytes, publisher: bytes) -> None:
@@ -116,7 +119,8 @@ class Ros2Vehicle:
         stamp_ns = message.stamp_ns or None
         sample = MotionSample(now_ns, velocity[:2], roll, pitch, vehicle_ns=stamp_ns, climb_m_s=velocity[2])
         report = self._plausibility.update(sample, state)
-        if report.withheld or report.of(*LIMITS.essential) is Health.BAD:
+        self._axes.take(stamp_ns or now_ns, message.position, message.velocity, velocity, yaw)
+        if self._axes.wrong or report.withheld or report.of(*LIMITS.essential) is Health.BAD:
             return
         doubted = report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.VELOCITY) is Health.SUSPECT
         variance = max(self._settings.velocity_std_m_s, SUSPECT_VELOCITY_STD_M_S if doubted else 0.0) ** 2
@@ -139,6 +143,8 @@ class Ros2Vehicle:
         known = self._charge_ns > 0 and now_ns - self._charge_ns < _CHARGE_NS
         trouble = self._link.trouble
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
+        if self._axes.wrong:
+            unsound = f"{self._odometry} moves as if its twist were {_ROOM_AXES}"
         if not fresh and self._refused:
             unsound = self._refusal
         scale, (x, y, z) = self._settings.velocity_scale, self._velocity

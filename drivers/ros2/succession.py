@@ -68,11 +68,13 @@ class Succession:
             return f"turned by {math.degrees(turn_rad):.0f} deg"
         return ""
 
-    def take(self, now_ns: int, publisher: bytes, message: OdometryMessage) -> None:
-        """Keep the publisher and the content of a message that counts."""
-        if self._tie.take(publisher, now_ns):
+    def take(self, now_ns: int, publisher: bytes, message: OdometryMessage) -> bool:
+        """Keep the publisher and the content of a message that counts; returns whether it is a new publisher."""
+        new = self._tie.take(publisher, now_ns)
+        if new:
             self._second_ns = 0  # it was the second one: the first is gone
         self._last, self._last_ns = message, now_ns
+        return new
 
 
 def _named(message: OdometryMessage) -> str:

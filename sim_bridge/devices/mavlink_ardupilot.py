@@ -1,8 +1,11 @@
 """ArduCopter 4.6 as a ground station sees it (docs/reference/mavlink.md 1, 5.3)."""
 
+import math
+
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import CUSTOM_MODE_ENABLED, Flavour, Landed, MavResult
 from drivers.mavlink.wire.names import CopterMode as Mode
+from groundstation.vectors import Vector3
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_numbers import byte, whole
 from sim_bridge.devices.mavlink_parameters import Parameters
@@ -31,6 +34,7 @@ class ArduCopter(AutopilotFirmware):
     homeward = Mode.RTL
     arming_refusal = mode_refusal = MavResult.FAILED
     disarmed_text = "Disarming motors"
+    place_frames = frozenset({1, 7, 8, 9})
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
         super().__init__(copter, parameters, Mode.STABILIZE)
@@ -98,6 +102,30 @@ class ArduCopter(AutopilotFirmware):
             self._climb_to_m = None
             self._braked = False
             super().obey(velocity_m_s, turn)
+
+    def go(self, place: Vector3, yaw: float | None) -> None:
+        """Fly to a place, without a time-out; it ends a take-off, and does not move a standing or paused vehicle."""
+        if self.copter.airborne and not self._paused:
+            self._climb_to_m = None
+            self._braked = True
+            super().go(place, yaw)
+
+    def reposition(self, parameters: tuple[float, ...], frame: int | None) -> Answer:
+        """Fly to a place in GUIDED; WIRE (ArduCopter 4.7, source): by COMMAND_INT only, its heading is not read."""
+        if frame is None:
+            return MavResult.UNSUPPORTED, "no frame"
+        if self.mode != Mode.GUIDED and not whole(parameters[1]) & 1:
+            return MavResult.DENIED, "not in GUIDED"
+        latitude, longitude, altitude_m = parameters[4:]
+        place = None
+        if abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and (latitude or longitude) and math.isfinite(altitude_m):
+            place = self.place_on_earth(latitude, longitude, altitude_m, frame)
+        if place is None:
+            return MavResult.DENIED if self.located else MavResult.FAILED, "no such place"
+        answer = self.set_mode(Mode.GUIDED)
+        if answer[0] is MavResult.ACCEPTED:
+            self.go(place, None)
+        return answer
 
     def pause(self, order: float) -> Answer:
         """Hover in GUIDED until the mode is entered anew; WIRE (docs/reference/mavlink.md 5.11)."""

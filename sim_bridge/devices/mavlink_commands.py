@@ -42,6 +42,9 @@ class Commands:
             params, fault = _params_of(message), self._fault_of_int(message)
         if fault:
             return [_ack(frame, command, MavResult.DENIED)]
+        if command == MavCmd.DO_REPOSITION:
+            frame_of_place = message.frame if isinstance(message, f.CommandInt) else None
+            return [_ack(frame, command, self._firmware.reposition(params, frame_of_place)[0])]
         results, more = self._obey(command, params, rates)
         return [*(_ack(frame, command, result) for result in results), *more]
 
@@ -78,8 +81,6 @@ class Commands:
                 return [firmware.go_home()[0]], []
             case MavCmd.NAV_LAND:
                 return [firmware.land()[0]], []
-            case MavCmd.DO_REPOSITION:
-                return [firmware.reposition(p)[0]], []
             case MavCmd.DO_PAUSE_CONTINUE:
                 return [firmware.pause(p[0])[0]], []
             case MavCmd.SET_MESSAGE_INTERVAL:

@@ -7,11 +7,14 @@ file's own signs.
 import math
 from collections import deque
 
-from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
+from drivers.mavlink.wire.flight import SetPositionTargetGlobalInt, SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import FORCE, Flavour, Landed, MavResult, MavState
+from groundstation.vectors import Vector3
 from sim_bridge.devices.mavlink_parameters import Parameters
+from sim_bridge.devices.mavlink_places import as_local, heading_of, height_in, local_place, on_ground
 from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.devices.mavlink_setpoints import Velocity
+from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 
 Answer = tuple[MavResult, str]
@@ -91,9 +94,9 @@ class AutopilotFirmware:
         """Climb to a height above the floor."""
         raise NotImplementedError
 
-    def reposition(self, parameters: tuple[float, ...]) -> Answer:
-        """Fly to a place, or stop here if none is named; parameters: the seven of the command."""
-        return MavResult.UNSUPPORTED, ""
+    def reposition(self, parameters: tuple[float, ...], frame: int | None) -> Answer:
+        """Fly to a place; parameters: the seven of DO_REPOSITION; frame: of a COMMAND_INT, None of a COMMAND_LONG."""
+        raise NotImplementedError
 
     def pause(self, order: float) -> Answer:
         """Pause the mode's motion, 0, or resume it, 1."""
@@ -107,8 +110,31 @@ class AutopilotFirmware:
         if self.now_s - self._setpoint_s > 0.5:
             self._stream_s = self.now_s
         self._setpoint_s = self.now_s
-        if self.armed and self.mode == self.guided:
+        if not self.armed or self.mode != self.guided:
+            return
+        place = local_place(setpoint, self.copter.estimate.position, self.copter.estimate.yaw)
+        if place is None or setpoint.coordinate_frame not in self.place_frames:
             self.obey(self._velocity(velocity, setpoint.coordinate_frame), self._turn(setpoint))
+        else:
+            self.go(place, heading_of(setpoint))
+
+    def fly_on_earth(self, setpoint: SetPositionTargetGlobalInt) -> None:
+        """Take a setpoint at a place on Earth, which counts only where the vehicle knows its own."""
+        local = self.origin and self.located and as_local(setpoint, self.origin, self._home_z_m)
+        if local:
+            self.fly(local)
+
+    def place_on_earth(self, latitude: float, longitude: float, altitude_m: float, frame: int) -> Vector3 | None:
+        """Return a place [deg, m] in the world, None without an origin, numbers, or a frame with an altitude."""
+        numbers = all(map(math.isfinite, (latitude, longitude, altitude_m)))
+        if self.origin is None or not self.located or not numbers:
+            return None
+        z = height_in(frame, self.origin, self._home_z_m, altitude_m)
+        return None if z is None else (*on_ground(self.origin, latitude, longitude), z)
+
+    @property
+    def _home_z_m(self) -> float:
+        return STANDING_HEIGHT_M if self.satellites is not None else 0.0
 
     def read(self, setpoint: SetPositionTargetLocalNed) -> Velocity | None:
         """Return the velocity of a setpoint [its own frame]; one without is answered here, with a text or a stop."""
@@ -135,6 +161,10 @@ class AutopilotFirmware:
     def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
         """Fly a velocity [heading frame, FLU]."""
         self.copter.fly(velocity_m_s, turn)
+
+    def go(self, place: Vector3, yaw: float | None) -> None:
+        """Fly to a place [world], and turn to a heading, None: keep it."""
+        self.copter.go(place, yaw)
 
     def enter(self, mode: int) -> None:
         """Change the mode."""
@@ -222,6 +252,8 @@ class AutopilotFirmware:
     # WIRE (PX4 1.15, ArduPilot 4.5, source): each has one answer to all that it refuses.
     arming_refusal = mode_refusal = MavResult.TEMPORARILY_REJECTED
     disarmed_text = "Disarmed"
+    # Frames of setpoints in which it reads a place.
+    place_frames: frozenset[int]
 
     def arming_fault(self) -> str:
         """Return its reason not to arm now, in its own words, or ""."""

@@ -4,6 +4,7 @@ import math
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import Flavour, MavResult, MavState, Px4Auto, Px4Main, px4_mode
+from groundstation.vectors import Vector3
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_numbers import byte
 from sim_bridge.devices.mavlink_parameters import Parameters
@@ -19,7 +20,7 @@ ALTITUDE = px4_mode(Px4Main.ALTITUDE)
 # Measured: 1.42 s for COM_OF_LOSS_T 1.0; lost vision 4.8 to 5.6 s for EKF2_NOAID_TOUT 5 s, 1 s for 0.9 s.
 _GRANULARITY_S, _NOTICED_S = 0.42, 0.1
 _SPOOL_S = 1.0
-_CLIMB_M_S, _REACHED_M = 1.0, 0.1
+_CLIMB_M_S, _REACHED_M, _LIFTS_M = 1.0, 0.1, 0.2
 _LOSS_MODES = {0: POSITION, 1: ALTITUDE, 2: px4_mode(Px4Main.STABILIZED), 4: LAND, 5: HOLD}
 _LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL), px4_mode(Px4Main.ACRO))
 MISSION = px4_mode(Px4Main.AUTO, Px4Auto.MISSION)
@@ -45,6 +46,7 @@ class Px4(AutopilotFirmware):
     landing = LAND
     homeward = RETURN
     disarmed_text = "Disarmed by landing"
+    place_frames = frozenset({1})
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters) -> None:
         super().__init__(copter, parameters, HOLD)
@@ -134,11 +136,31 @@ class Px4(AutopilotFirmware):
             return self.has_global_position
         return mode != MISSION  # there is none
 
-    def reposition(self, parameters: tuple[float, ...]) -> Answer:
-        """Hold here if no place is named; WIRE (docs/reference/mavlink.md 5.11): QGroundControl's Pause."""
-        if parameters[1] != 1.0 or not all(map(math.isnan, parameters[3:])):
-            return super().reposition(parameters)
-        return self.set_mode(HOLD)
+    def reposition(self, parameters: tuple[float, ...], frame: int | None) -> Answer:
+        """Enter HOLD and fly to a place, or stop here if none is named: QGroundControl's Pause.
+
+        WIRE (docs/reference/mavlink.md 5.11; main of June 2025, source): only with the flag of a change of mode and no
+        other. What is no number stays as it is; the altitude is above the sea in any frame, the heading in radians.
+        """
+        if parameters[1] != 1.0:
+            return MavResult.UNSUPPORTED, ""
+        answer = self.set_mode(HOLD)
+        if answer[0] is MavResult.ACCEPTED and self.armed and self.copter.airborne and self.origin is not None:
+            self._go_on_earth(*parameters[3:])
+        return answer
+
+    def _go_on_earth(self, yaw: float, latitude: float, longitude: float, altitude_m: float) -> None:
+        if not any(map(math.isfinite, (yaw, latitude, longitude, altitude_m))):
+            self.copter.steer(Steering.HOLD)
+            return
+        here, named = self.copter.estimate.position, math.isfinite(latitude) and math.isfinite(longitude)
+        assert self.origin is not None
+        at_sea = self.origin[2] * 1e-3
+        degrees = (latitude, longitude) if named else (self.origin[0] * 1e-7, self.origin[1] * 1e-7)
+        place = self.place_on_earth(*degrees, altitude_m if math.isfinite(altitude_m) else at_sea, 0)
+        if place is not None:
+            x, y = place[:2] if named else here[:2]
+            self.go((x, y, place[2] if math.isfinite(altitude_m) else here[2]), -yaw if math.isfinite(yaw) else None)
 
     def enter(self, mode: int) -> None:
         """Change the mode, which ends a take-off; AUTO.TAKEOFF without a height climbs to that of the parameter."""
@@ -174,6 +196,14 @@ class Px4(AutopilotFirmware):
             if not self.copter.airborne and velocity_m_s[2] > 0.05:
                 self.say(6, "Takeoff detected")
             super().obey(velocity_m_s, turn)
+
+    def go(self, place: Vector3, yaw: float | None) -> None:
+        """Fly to a place, once the propellers are up to speed; from the floor only up."""
+        if self.copter.airborne:
+            super().go(place, yaw)
+        elif place[2] > self.copter.estimate.position[2] + _LIFTS_M and self.now_s - self._armed_s >= _SPOOL_S:
+            self.say(6, "Takeoff detected")
+            super().go(place, yaw)
 
     def steering_of(self, mode: int) -> Steering:
         """Return the motors' action for a mode, in the air."""

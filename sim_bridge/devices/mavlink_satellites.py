@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
+from sim_bridge.devices.mavlink_places import DEGREE_M
 from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 
-_DEGREE_M = 111_318.845
 _NOISE_M = 0.02
 _EVERY_TICKS = 20  # 10 Hz
 
@@ -34,8 +34,8 @@ class Satellites:
 
     def degrees(self, x: float, y: float) -> tuple[int, int]:
         """Return latitude and longitude [deg x 1e7] of a place [m; x north, y west]."""
-        latitude = self._latitude + x / _DEGREE_M
-        return round(latitude * 1e7), round((self._longitude - y / (_DEGREE_M * self._shrink)) * 1e7)
+        latitude = self._latitude + x / DEGREE_M
+        return round(latitude * 1e7), round((self._longitude - y / (DEGREE_M * self._shrink)) * 1e7)
 
     def altitude_mm(self, z: float) -> int:
         """Return the altitude of a height above the floor [m]."""

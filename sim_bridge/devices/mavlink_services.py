@@ -22,12 +22,13 @@ from sim_bridge.devices.mavlink_time import SenderClock
 
 _ALL = 0
 # WIRE (PX4 1.15, source): the only messages and commands that a PX4 accepts when they are addressed to all systems.
-_FOR_ALL = (f.SetPositionTargetLocalNed, s.Ping)
+_FOR_ALL = (f.SetPositionTargetLocalNed, f.SetPositionTargetGlobalInt, s.Ping)
 _COMMANDS_FOR_ALL = (MavCmd.REQUEST_AUTOPILOT_CAPABILITIES, MavCmd.REQUEST_PROTOCOL_VERSION)
 # WIRE (MAV_MISSION_RESULT).
 _MISSION_ACCEPTED, _MISSION_ERROR, _MISSION_UNSUPPORTED = 0, 1, 3
 _POLE, _ROUND = 900_000_000, 1_800_000_000  # 1e-7 degrees
 _FRESH_S = 0.5
+_GO_THERE = 2  # of a mission item's `current`
 
 
 class Services:
@@ -53,6 +54,8 @@ class Services:
                 return self._commands.set_mode(frame, message)
             case f.SetPositionTargetLocalNed():
                 self._firmware.fly(message)
+            case f.SetPositionTargetGlobalInt():
+                self._firmware.fly_on_earth(message)
             case f.VisionPositionEstimate() | f.OdometryMessage():
                 self._vision(message, now_ns, channel.clock)
             case s.SetGpsGlobalOrigin():
@@ -107,12 +110,23 @@ class Services:
                 # WIRE (source): ArduPilot 4.5 repeats how many there are; PX4 ignores what it did not announce.
                 yield s.MissionCount(frame.system, frame.component, 0, message.mission_type)
                 yield s.MissionAck(frame.system, frame.component, _MISSION_ERROR, message.mission_type)
+            case f.MissionItem() if not self._px4 and message.current == _GO_THERE:
+                yield s.MissionAck(frame.system, frame.component, self._guide(message), 0)
             case s.MissionCount() | s.MissionClearAll():
                 yield _mission_answer(frame, message)
             case s.FileTransferProtocol():
                 yield refusal(message, frame.system, frame.component)
             case s.RequestDataStream() if not self._px4 and message.start_stop in (0, 1):
                 channel.rates.set_old(message.req_stream_id, message.req_message_rate * message.start_stop)
+
+    def _guide(self, item: f.MissionItem) -> int:
+        """Fly to a point at once, as DroneKit's simple_goto asks; WIRE (ArduCopter 4.7, source): in GUIDED only."""
+        firmware = self._firmware
+        place = firmware.place_on_earth(item.x, item.y, item.z, item.frame)
+        if firmware.mode != firmware.guided or place is None:
+            return _MISSION_ERROR
+        firmware.go(place, None)
+        return _MISSION_ACCEPTED
 
     def _named(self, message: s.ParamRequestRead) -> str:
         """Return the parameter that is asked for, "" if there is none; WIRE (source): then nothing is answered."""

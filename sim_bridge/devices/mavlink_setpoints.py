@@ -1,6 +1,6 @@
 """SET_POSITION_TARGET_LOCAL_NED as each firmware reads it. Pure.
 
-The emulated vehicles fly velocities only: a place or an acceleration is a setpoint too, at which they hover.
+Places are read by `mavlink_places.py`. An acceleration is a setpoint too, at which the emulated vehicles hover.
 """
 
 import math

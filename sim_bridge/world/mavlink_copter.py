@@ -24,6 +24,7 @@ _MOST_M_S2 = 3.0
 _CLIMB_RATE, _CLIMB_DAMPING = 4.4, 0.6
 _YAW_RATE = 6.0
 _HOLD_GAIN, _HOLD_M_S = 0.9, 0.5
+_GO_M_S, _FACE_GAIN, _FACE_RAD_S = 2.0, 1.5, 1.0
 _TILT_TIME_S = 0.12
 _DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
 _DRAG = 0.25  # 1/s, when only the attitude is held
@@ -90,6 +91,8 @@ class MavlinkCopter:
         self._delayed: DelayLine[tuple[Vector3, float]] = DelayLine(response.dead_s, tick_s, (_STILL, 0.0))
         self._acceleration = [0.0, 0.0, 0.0]  # heading frame
         self._held: Vector3 | None = None
+        self._goes = False
+        self._faces: float | None = None
         self.wind = self._braced = (0.0, 0.0)
 
     @property
@@ -109,8 +112,9 @@ class MavlinkCopter:
 
     def steer(self, steering: Steering) -> None:
         """Change the state of the motors."""
-        if steering is not self.steering:
+        if steering is not self.steering or self._goes:
             self.steering, self.since_s, self._held = steering, 0.0, None
+            self._goes, self._faces = False, None
             self._wanted = (_STILL, 0.0)
             if steering in (Steering.OFF, Steering.IDLE):
                 self._acceleration = [0.0, 0.0, 0.0]
@@ -119,6 +123,12 @@ class MavlinkCopter:
         """Fly a velocity [heading frame, FLU] until the next command."""
         self.steer(Steering.VELOCITY)
         self._wanted = (velocity_m_s, yaw_rate_rad_s)
+
+    def go(self, place: Vector3, yaw: float | None) -> None:
+        """Fly to a place [m; of its own estimate] and hold it; yaw: the heading to turn to [rad], None: the present."""
+        if not self._goes:
+            self.steer(Steering.HOLD)
+        self._held, self._faces, self._goes = place, yaw, True
 
     def step(self, wake: Vector3) -> None:
         """Advance by one tick under the wake of the others [m/s^2; world]."""
@@ -146,7 +156,10 @@ class MavlinkCopter:
                 drift_x, drift_y = self._drift
                 self._pursue((self._gain * forward + drift_x, self._gain * left + drift_y, up), turn, wake)
             case Steering.HOLD:
-                self._pursue(self._towards_held(), 0.0, wake)
+                wanted_m_s = self._towards_held()
+                if body.on_ground and wanted_m_s[2] <= 0.05:
+                    return
+                self._pursue(wanted_m_s, self._towards_faced(), wake)
             case Steering.LAND:
                 if body.on_ground:
                     return  # the landing detector has cut the thrust
@@ -172,8 +185,17 @@ class MavlinkCopter:
             self._held = position
         dx, dy, dz = (_HOLD_GAIN * (h - p) for h, p in zip(self._held, position, strict=True))
         c, s = math.cos(self.estimate.yaw), math.sin(self.estimate.yaw)
-        limited = [max(-_HOLD_M_S, min(_HOLD_M_S, v)) for v in (c * dx + s * dy, c * dy - s * dx, dz)]
-        return limited[0], limited[1], limited[2]
+        if self._goes and (speed := math.hypot(dx, dy)) > _GO_M_S:
+            dx, dy = dx * _GO_M_S / speed, dy * _GO_M_S / speed
+        most = _GO_M_S if self._goes else _HOLD_M_S
+        limited = [max(-most, min(most, v)) for v in (c * dx + s * dy, c * dy - s * dx, dz)]
+        return limited[0], limited[1], max(-_HOLD_M_S, min(_HOLD_M_S, limited[2]))
+
+    def _towards_faced(self) -> float:
+        if self._faces is None:
+            return 0.0
+        turn = _FACE_GAIN * math.remainder(self._faces - self.estimate.yaw, math.tau)
+        return max(-_FACE_RAD_S, min(_FACE_RAD_S, turn))
 
     def _pursue(self, wanted: Vector3, turn: float, wake: Vector3) -> None:
         # The autopilot has only its estimate of velocity and heading.

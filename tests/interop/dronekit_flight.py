@@ -31,6 +31,9 @@ until(lambda: vehicle.armed, 10)
 vehicle.simple_takeoff(1.5)
 until(lambda: vehicle.location.global_relative_frame.alt > 1.3, 20)
 seen["height"] = vehicle.location.global_relative_frame.alt
+home = vehicle.location.global_relative_frame
+vehicle.simple_goto(dronekit.LocationGlobalRelative(home.lat + 3.0 / 111_319.0, home.lon, 1.5))
+until(lambda: (vehicle.location.global_relative_frame.lat - home.lat) * 111_319.0 > 2.7, 20)
 vehicle.mode = dronekit.VehicleMode("LAND")
 until(lambda: not vehicle.armed, 30)
 vehicle.close()

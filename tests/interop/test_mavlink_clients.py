@@ -74,6 +74,11 @@ async def fly_with_mavsdk(port: int) -> list[Any]:
         await action.arm()
         await action.takeoff()
         await asyncio.sleep(8.0)
+        here = await telemetry.position()
+        north = here.latitude_deg + 3.0 / 111_319.0
+        await action.goto_location(north, here.longitude_deg, here.absolute_altitude_m, 0.0)
+        await asyncio.sleep(6.0)
+        assert abs((await telemetry.position()).latitude_deg - north) * 111_319.0 < 0.3
         await action.land()
         while await telemetry.armed() and time.monotonic() < deadline + 40.0:
             await asyncio.sleep(0.2)

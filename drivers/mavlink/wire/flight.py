@@ -31,6 +31,27 @@ class SetPositionTargetLocalNed(NamedTuple):
     yaw_rate: float
 
 
+class SetPositionTargetGlobalInt(NamedTuple):
+    """A setpoint at a place on Earth [deg x 1e7, m], with velocities as those of SetPositionTargetLocalNed."""
+
+    time_boot_ms: int
+    target_system: int
+    target_component: int
+    coordinate_frame: int
+    type_mask: int
+    lat_int: int
+    lon_int: int
+    alt: float
+    vx: float
+    vy: float
+    vz: float
+    afx: float
+    afy: float
+    afz: float
+    yaw: float
+    yaw_rate: float
+
+
 class VisionPositionEstimate(NamedTuple):
     """A pose measured from outside: NED [m], roll pitch yaw [rad], upper triangle of its covariance (6, 6)."""
 

@@ -196,7 +196,7 @@ def test_a_px4_that_is_sent_nowhere_holds(bench_of):
     bench, nan = bench_of("px4").run(2.0), float("nan")
     bench.say(s.SetGpsGlobalOrigin(5, 473_977_420, 85_455_940, 488_000))
     bench.up()
-    assert bench.command(192, -1.0, 1.0, 0.0, nan, nan, nan, 1.0) == 3
+    assert bench.command(192, -1.0, 0.0, 0.0, nan, nan, nan, nan) == 3, "only with the flag of a change of mode"
     assert bench.firmware.mode == OFFBOARD
     assert bench.command(192, -1.0, 1.0, 0.0, nan, nan, nan, nan) == 0
     assert bench.firmware.mode == 4 << 16 | 3 << 24

@@ -47,7 +47,7 @@ def wrong_after(flight: Flight, seconds: float) -> float | None:
 @pytest.mark.parametrize("yaw", [0.7, -1.6, 3.1])
 def test_a_twist_in_the_axes_of_the_room_is_recognised_within_two_metres(yaw: float) -> None:
     after = [wrong_after(Flight(seed, yaw, in_room=True), 60.0) for seed in range(20)]
-    assert None not in after and np.median([one for one in after if one is not None]) < 10.0
+    assert None not in after and max(one for one in after if one is not None) < 10.0
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -1.6, 3.1])

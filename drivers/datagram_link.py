@@ -13,6 +13,7 @@ from drivers.datagrams import DatagramLog
 from drivers.vehicle_socket import open_udp
 from groundstation.adapters import Address
 from groundstation.bus import clock
+from groundstation.errors import DriverError
 from groundstation.time_units import NS_PER_MS
 
 # Takes a datagram with its arrival [ns] and returns whether it was a report of the vehicle. A ValueError refuses it;
@@ -22,6 +23,7 @@ Take = Callable[[int, bytes], bool]
 _WAIT_S = 0.1
 _LARGEST = 4096
 _SILENT_NS = 300 * NS_PER_MS
+_SEEKS_NS = 2000 * NS_PER_MS
 _log = logging.getLogger(__name__)
 
 
@@ -29,8 +31,9 @@ class DatagramLink:
     """Ports of this computer, each with a taker of its datagrams; the first one sends to the vehicle.
 
     All are connected to the vehicle's one port: only that is received, and several vehicles may share a port of ours.
-    Takers are called from the reader thread, which starts at once. Raises DriverError for a port or an address that is
-    not available.
+    One that has received nothing 2 s after the first answer takes the datagrams of any port of the vehicle's address,
+    and is connected to the port of the first. Takers are called from the reader thread, which starts at once. Raises
+    DriverError for a port or an address that is not available.
     """
 
     def __init__(
@@ -38,11 +41,13 @@ class DatagramLink:
     ) -> None:  # fmt: skip
         self._log = log
         self._takers: dict[socket.socket, Take] = {}
+        self._peer, self._interface = peer, interface
+        self._unheard: dict[Take, Address] = {take: local for local, take in takers.items()}
+        self._seeking: set[socket.socket] = set()
+        self._answered_ns = 0
         try:
             for local, take in takers.items():
-                udp = open_udp(local, interface, peer)
-                udp.setblocking(False)
-                self._takers[udp] = take
+                self._open(take, local, peer)
         except BaseException:
             self._close_sockets()
             raise
@@ -58,7 +63,44 @@ class DatagramLink:
             readable, _, _ = select.select(list(self._takers), [], [], _WAIT_S)
             for udp in readable:
                 with suppress(OSError):  # nobody listens there yet
-                    self._hand_on(clock.now_ns(), udp.recv(_LARGEST), self._takers[udp])
+                    data, sender = udp.recvfrom(_LARGEST)
+                    self._receive(clock.now_ns(), udp, data, sender)
+            if self._unheard and self._answered_ns and clock.now_ns() - self._answered_ns > _SEEKS_NS:
+                self._seek()
+
+    def _open(self, take: Take, local: Address, peer: Address | None) -> socket.socket:
+        udp = open_udp(local, self._interface, peer, shares=peer is None)
+        udp.setblocking(False)
+        self._takers[udp] = take
+        return udp
+
+    def _receive(self, now_ns: int, udp: socket.socket, data: bytes, sender: Address) -> None:
+        take = self._takers[udp]
+        if udp in self._seeking:
+            if sender[0] != self._peer[0]:
+                self._rejected["stranger"] += 1
+                return
+            self._replace(udp, sender)
+        self._unheard.pop(take, None)
+        if udp is self._voice:
+            self._answered_ns = self._answered_ns or now_ns
+        self._hand_on(now_ns, data, take)
+
+    def _seek(self) -> None:
+        """Let ports that heard nothing hear each port of the vehicle's address."""
+        for udp, take in list(self._takers.items()):
+            if take in self._unheard and udp not in self._seeking and udp is not self._voice:
+                self._replace(udp, None)
+
+    def _replace(self, udp: socket.socket, peer: Address | None) -> None:
+        take = self._takers[udp]
+        with suppress(DriverError):  # a port that another program has taken stays as it is
+            opened = self._open(take, udp.getsockname(), peer)
+            del self._takers[udp]
+            self._seeking.discard(udp)
+            udp.close()
+            if peer is None:
+                self._seeking.add(opened)
 
     def _hand_on(self, now_ns: int, data: bytes, take: Take) -> None:
         self._log.received(now_ns, data)

@@ -9,18 +9,21 @@ from groundstation.errors import DriverError
 from groundstation.process.ports import why_refused
 
 
-def open_udp(local: Address, interface: str = "", peer: Address | None = None) -> socket.socket:
+def open_udp(
+    local: Address, interface: str = "", peer: Address | None = None, *, shares: bool = False
+) -> socket.socket:  # fmt: skip
     """Return a datagram socket on an own address ("": any) and port (0: any free), through one adapter ("": any).
 
-    With a peer it receives from that only, and several sockets may share the port, each with a peer of its own. Raises
-    DriverError if the port is taken (naming its holder), the peer unreachable, or the adapter unknown.
+    With a peer it receives from that only, and several sockets may share the port, each with a peer of its own; one
+    that shares it without a peer gets what is for none of those. Raises DriverError if the port is taken (naming its
+    holder), the peer unreachable, or the adapter unknown.
     """
     one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     bind_to_adapter(one, interface)
     address, port = local
     place = f"{address or '*'}:{port or 'any'} (UDP)"
     try:
-        if peer is not None:
+        if peer is not None or shares:
             one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         one.bind(local)
     except OSError as error:

@@ -125,3 +125,49 @@ def test_a_port_that_cannot_be_had_leaves_none_open(vehicle: socket.socket) -> N
         DatagramLink(log, vehicle.getsockname(), takers)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
         again.bind(("127.0.0.2", port))
+
+
+def test_a_port_that_hears_nothing_takes_what_the_vehicle_sends_from_another(
+    vehicle: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivers.datagram_link._SEEKS_NS", 100_000_000)
+    states, came = list[bytes](), threading.Event()
+
+    def take(now_ns: int, data: bytes) -> bool:
+        states.append(data)
+        came.set()
+        return True
+
+    with (
+        closing(link_to(vehicle, lambda now_ns, data: False, take)) as link,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+    ):
+        other.bind((HERE, 0))
+        stranger.bind(("127.0.0.9", 0))
+        ports = [udp.getsockname() for udp in link._takers]
+        other.sendto(b"early", ports[1])
+        time.sleep(0.3)
+        assert not link._seeking, "the vehicle has not answered yet"
+        link.send(clock.now_ns(), b"hello")
+        vehicle.sendto(b"ok", vehicle.recvfrom(100)[1])
+        deadline = time.monotonic() + 5.0
+        while not came.is_set() and time.monotonic() < deadline:
+            stranger.sendto(b"strange", ports[1])
+            other.sendto(b"state", ports[1])
+            time.sleep(0.02)
+        assert came.is_set() and not link._seeking
+        vehicle.sendto(b"ok", ports[0])
+        vehicle.sendto(b"from its usual port", ports[1])
+        time.sleep(0.3)
+    assert set(states) == {b"state"}
+
+
+def test_a_port_that_hears_the_vehicle_stays_with_it(vehicle: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.datagram_link._SEEKS_NS", 100_000_000)
+    with closing(link_to(vehicle, lambda *_: False, lambda *_: True)) as link:
+        opened = list(link._takers)
+        for port in (udp.getsockname() for udp in opened):
+            vehicle.sendto(b"ok", port)
+        time.sleep(0.5)
+        assert list(link._takers) == opened

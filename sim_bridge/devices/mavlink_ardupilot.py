@@ -22,6 +22,8 @@ _STOPPED_AIDING_S = 15.0
 _LANDS_AFTER_S = 4.0
 _LEVEL = (Mode.STABILIZE, Mode.ALT_HOLD)
 _LANDS = 3  # of FS_THR_ENABLE
+# Kinds of speeds: by the air, along the ground, up, down; and their end.
+_SPEEDS, _ALONG_GROUND, _NO_SPEED = (0.0, 1.0, 2.0, 3.0), (0.0, 1.0), 4.0
 _GCS_ACTIONS = frozenset({1, 3, 5, 7})
 
 
@@ -126,6 +128,29 @@ class ArduCopter(AutopilotFirmware):
         if answer[0] is MavResult.ACCEPTED:
             self.go(place, None)
         return answer
+
+    def turn_to(self, parameters: tuple[float, ...]) -> Answer:
+        """Turn to a heading, or by an angle; WIRE (ArduCopter 4.7, source)."""
+        degrees, _, direction, relative = parameters[:4]
+        if not 0.0 <= degrees <= 360.0 or relative not in (0.0, 1.0):
+            return MavResult.FAILED, "no such heading"
+        turn = math.radians(degrees)
+        yaw = self.copter.estimate.yaw - math.copysign(turn, direction) if relative else -turn
+        if self.mode == Mode.GUIDED and self.copter.airborne and not self._paused:
+            self._climb_to_m, self._braked = None, True
+            self.copter.face(yaw)
+        return MavResult.ACCEPTED, ""
+
+    def set_speed(self, parameters: tuple[float, ...]) -> Answer:
+        """Take a speed along the ground; WIRE (ArduCopter 4.7, source): only in a mode that has one, as GUIDED."""
+        kind, speed_m_s = parameters[:2]
+        if not 0.0 < speed_m_s < math.inf or kind == _NO_SPEED:
+            return MavResult.DENIED, "no speed"
+        if self.mode != Mode.GUIDED or kind not in _SPEEDS:
+            return MavResult.FAILED, "not now"
+        if kind in _ALONG_GROUND:
+            self.copter.fastest_m_s = speed_m_s
+        return MavResult.ACCEPTED, ""
 
     def pause(self, order: float) -> Answer:
         """Hover in GUIDED until the mode is entered anew; WIRE (docs/reference/mavlink.md 5.11)."""

@@ -81,6 +81,10 @@ class Commands:
                 return [firmware.go_home()[0]], []
             case MavCmd.NAV_LAND:
                 return [firmware.land()[0]], []
+            case MavCmd.CONDITION_YAW:
+                return [firmware.turn_to(p)[0]], []
+            case MavCmd.DO_CHANGE_SPEED:
+                return [firmware.set_speed(p)[0]], []
             case MavCmd.DO_PAUSE_CONTINUE:
                 return [firmware.pause(p[0])[0]], []
             case MavCmd.SET_MESSAGE_INTERVAL:

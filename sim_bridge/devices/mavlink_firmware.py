@@ -98,6 +98,14 @@ class AutopilotFirmware:
         """Fly to a place; parameters: the seven of DO_REPOSITION; frame: of a COMMAND_INT, None of a COMMAND_LONG."""
         raise NotImplementedError
 
+    def turn_to(self, parameters: tuple[float, ...]) -> Answer:
+        """Turn to a heading; parameters: the seven of CONDITION_YAW."""
+        return MavResult.UNSUPPORTED, ""
+
+    def set_speed(self, parameters: tuple[float, ...]) -> Answer:
+        """Take the speed of ways to places; parameters: the seven of DO_CHANGE_SPEED."""
+        raise NotImplementedError
+
     def pause(self, order: float) -> Answer:
         """Pause the mode's motion, 0, or resume it, 1."""
         return MavResult.UNSUPPORTED, ""

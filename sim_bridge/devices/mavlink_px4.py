@@ -9,7 +9,7 @@ from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
 from sim_bridge.devices.mavlink_numbers import byte
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.devices.mavlink_setpoints import Velocity, read_by_px4
-from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
+from sim_bridge.world.mavlink_copter import GO_M_S, MavlinkCopter, Steering
 
 HOLD = px4_mode(Px4Main.AUTO, Px4Auto.HOLD)
 TAKE_OFF = px4_mode(Px4Main.AUTO, Px4Auto.TAKE_OFF)
@@ -148,6 +148,11 @@ class Px4(AutopilotFirmware):
         if answer[0] is MavResult.ACCEPTED and self.armed and self.copter.airborne and self.origin is not None:
             self._go_on_earth(*parameters[3:])
         return answer
+
+    def set_speed(self, parameters: tuple[float, ...]) -> Answer:
+        """Take a speed; WIRE (main of June 2025, source): always accepted, none is the default."""
+        self.copter.fastest_m_s = parameters[1] if 0.0 < parameters[1] < math.inf else GO_M_S
+        return MavResult.ACCEPTED, ""
 
     def _go_on_earth(self, yaw: float, latitude: float, longitude: float, altitude_m: float) -> None:
         if not any(map(math.isfinite, (yaw, latitude, longitude, altitude_m))):

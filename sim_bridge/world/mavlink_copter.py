@@ -24,7 +24,7 @@ _MOST_M_S2 = 3.0
 _CLIMB_RATE, _CLIMB_DAMPING = 4.4, 0.6
 _YAW_RATE = 6.0
 _HOLD_GAIN, _HOLD_M_S = 0.9, 0.5
-_GO_M_S, _FACE_GAIN, _FACE_RAD_S = 2.0, 1.5, 1.0
+GO_M_S, _FACE_GAIN, _FACE_RAD_S = 2.0, 1.5, 1.0
 _TILT_TIME_S = 0.12
 _DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
 _DRAG = 0.25  # 1/s, when only the attitude is held
@@ -93,6 +93,7 @@ class MavlinkCopter:
         self._held: Vector3 | None = None
         self._goes = False
         self._faces: float | None = None
+        self.fastest_m_s = GO_M_S  # on its way to a place
         self.wind = self._braced = (0.0, 0.0)
 
     @property
@@ -129,6 +130,10 @@ class MavlinkCopter:
         if not self._goes:
             self.steer(Steering.HOLD)
         self._held, self._faces, self._goes = place, yaw, True
+
+    def face(self, yaw: float) -> None:
+        """Turn to a heading [rad], on its way to a place or where it is."""
+        self.go(self._held if self._goes and self._held else self.estimate.position, yaw)
 
     def step(self, wake: Vector3) -> None:
         """Advance by one tick under the wake of the others [m/s^2; world]."""
@@ -185,9 +190,9 @@ class MavlinkCopter:
             self._held = position
         dx, dy, dz = (_HOLD_GAIN * (h - p) for h, p in zip(self._held, position, strict=True))
         c, s = math.cos(self.estimate.yaw), math.sin(self.estimate.yaw)
-        if self._goes and (speed := math.hypot(dx, dy)) > _GO_M_S:
-            dx, dy = dx * _GO_M_S / speed, dy * _GO_M_S / speed
-        most = _GO_M_S if self._goes else _HOLD_M_S
+        most = self.fastest_m_s if self._goes else _HOLD_M_S
+        if self._goes and (speed := math.hypot(dx, dy)) > most:
+            dx, dy = dx * most / speed, dy * most / speed
         limited = [max(-most, min(most, v)) for v in (c * dx + s * dy, c * dy - s * dx, dz)]
         return limited[0], limited[1], max(-_HOLD_M_S, min(_HOLD_M_S, limited[2]))
 

@@ -119,6 +119,29 @@ def test_an_ardupilot_flies_to_places_on_earth(bench_of):
     assert [one.type for one in bench.say(item) if isinstance(one, s.MissionAck)] == [1], "in GUIDED only"
 
 
+def test_an_ardupilot_turns_to_a_heading_and_takes_a_speed(bench_of):
+    """DroneKit's condition_yaw and groundspeed."""
+    bench = bench_of("ardupilot")
+    bench.setpoint = None
+    assert bench.command(115, 90.0, 0.0, 1.0, 0.0) == 0
+    assert bench.run(5.0).copter.airframe.yaw == pytest.approx(-math.pi / 2, abs=0.1)
+    assert bench.command(115, 30.0, 0.0, -1.0, 1.0) == 0
+    assert bench.run(4.0).copter.airframe.yaw == pytest.approx(math.radians(-60.0), abs=0.15)
+    assert bench.command(115, 400.0) == bench.command(115, 0.0, 0.0, 1.0, 0.5) == 4
+    assert bench.command(178, 1.0, 0.0) == bench.command(178, 4.0, 1.0) == 2 and bench.command(178, 9.0, 1.0) == 4
+    assert bench.command(178, 1.0, 0.5) == 0
+    bench.say(local((9.0, 0.0, -1.0)))
+    assert bench.run(4.0).copter.airframe.vx == pytest.approx(0.5, abs=0.15)
+    assert bench.command(176, 1.0, LOITER) == 0 and bench.command(178, 1.0, 1.0) == 4
+
+
+def test_a_px4_takes_any_speed_and_turns_to_no_heading_of_an_ardupilot(bench_of):
+    bench = bench_of("px4")
+    assert bench.command(178, 1.0, 0.5) == 0 and bench.copter.fastest_m_s == 0.5
+    assert bench.command(178, 1.0, -1.0) == 0 and bench.copter.fastest_m_s == 2.0
+    assert bench.command(115, 90.0, 0.0, 1.0) == 3
+
+
 def test_places_that_are_no_numbers_move_nothing(bench_of):
     bench = bench_of("ardupilot")
     bench.setpoint = None

@@ -31,12 +31,14 @@ def on_earth(north, east):
 
 
 def local(place, frame=1, mask=PLACE, yaw=0.0):
-    return f.SetPositionTargetLocalNed(0, 5, 1, frame, mask, *place, 0, 0, 0, 0, 0, 0, yaw, 0)
+    x, y, z = place
+    return f.SetPositionTargetLocalNed(0, 5, 1, frame, mask, x, y, z, 0, 0, 0, 0, 0, 0, yaw, 0)
 
 
 def reposition(bench, north, east, altitude, frame=5, flag=1.0, yaw=NAN):
     """MAVSDK's goto_location, with its frame; QGroundControl's has frame 0. Return the result."""
-    bench.say(f.CommandInt(5, 1, frame, 192, 0, 0, -1.0, flag, 0.0, yaw, *on_earth(north, east), altitude))
+    latitude, longitude = on_earth(north, east)
+    bench.say(f.CommandInt(5, 1, frame, 192, 0, 0, -1.0, flag, 0.0, yaw, latitude, longitude, altitude))
     return [m.result for m in bench.heard if isinstance(m, f.CommandAckMessage) and m.command == 192][-1]
 
 
@@ -65,7 +67,7 @@ def test_a_px4_in_offboard_flies_to_places_while_they_keep_coming(bench_of):
     bench.run(6.0)
     assert north_east_up(bench) == (2.0, 1.0, 1.5) and bench.copter.airframe.yaw == pytest.approx(-0.5, abs=0.1)
     latitude, longitude = on_earth(0.0, 0.0)
-    bench.setpoint = f.SetPositionTargetGlobalInt(0, 0, 0, 6, PLACE, latitude, longitude, 1.0, *(0.0,) * 6, 0.0, 0.0)
+    bench.setpoint = f.SetPositionTargetGlobalInt(0, 0, 0, 6, PLACE, latitude, longitude, 1.0, 0, 0, 0, 0, 0, 0, 0, 0)
     bench.run(6.0)
     assert north_east_up(bench) == (0.0, 0.0, 1.0)
     bench.setpoint = local((5.0, 0.0, -1.0), frame=8)  # a place in the body's frame is none, and so no setpoint
@@ -88,7 +90,7 @@ def test_a_px4_takes_off_to_a_place(hand):
 def test_an_ardupilot_flies_to_a_place_that_is_said_once(bench_of, frame, place, there):
     bench = bench_of("ardupilot")
     if frame == 9:  # to the west, so that the right is north
-        bench.setpoint = f.SetPositionTargetLocalNed(0, 5, 1, 8, 0x9C7, *(0.0,) * 9, -math.pi / 2, 0.0)
+        bench.setpoint = f.SetPositionTargetLocalNed(0, 5, 1, 8, 0x9C7, 0, 0, 0, 0, 0, 0, 0, 0, 0, -math.pi / 2, 0)
         bench.run(4.0)
     bench.setpoint = None
     bench.say(local(place, frame))
@@ -110,7 +112,8 @@ def test_an_ardupilot_flies_to_places_on_earth(bench_of):
     answers = bench.say(item)
     assert [one.type for one in answers if isinstance(one, s.MissionAck)] == [0]
     assert north_east_up(bench.run(8.0)) == (0.0, 2.0, 1.0)
-    bench.say(f.SetPositionTargetGlobalInt(0, 5, 1, 6, PLACE, *on_earth(0.0, -2.0), 1.0, *(0.0,) * 6, 0.0, 0.0))
+    latitude, longitude = on_earth(0.0, -2.0)
+    bench.say(f.SetPositionTargetGlobalInt(0, 5, 1, 6, PLACE, latitude, longitude, 1.0, 0, 0, 0, 0, 0, 0, 0, 0))
     bench.run(1.5)
     assert bench.copter.airframe.vy > 0.5
     assert bench.command(176, 1.0, LOITER) == 0
@@ -150,7 +153,7 @@ def test_places_that_are_no_numbers_move_nothing(bench_of):
         answers = bench.say(f.MissionItem(0, 0, 0, 3, 16, 2, 0, 0.0, 0.0, 0.0, 0.0, *place, 0))
         assert [one.type for one in answers if isinstance(one, s.MissionAck)] == [1]
     latitude, longitude = on_earth(3.0, 0.0)
-    bench.say(f.SetPositionTargetGlobalInt(0, 5, 1, 6, PLACE, latitude, longitude, NAN, *(0.0,) * 6, 0.0, 0.0))
+    bench.say(f.SetPositionTargetGlobalInt(0, 5, 1, 6, PLACE, latitude, longitude, NAN, 0, 0, 0, 0, 0, 0, 0, 0))
     bench.say(local((NAN, 1.0, -1.0)))
     assert before == north_east_up(bench.run(3.0)).expected
 

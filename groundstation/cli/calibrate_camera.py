@@ -170,6 +170,8 @@ class CalibrationSession:
         return f"{count} usable view(s), at least {least} are needed ({reasons}); {hint}"
 
     def _report(self, fit: "LensFit") -> None:
+        from groundstation.geometry.lens import MOST_RESIDUAL_PX
+
         lens, std = fit.lens, fit.std
         refused = ", ".join(f"{number} x {flaw}" for flaw, number in self.judge.flaws.most_common())
         lines = [
@@ -180,6 +182,11 @@ class CalibrationSession:
             f"rms {lens.residual_px:.3f} px; worst view {max(fit.by_view_px, key=fit.by_view_px.__getitem__)} "
             f"({max(fit.by_view_px.values()):.2f} px)",
         ]
+        if lens.residual_px > MOST_RESIDUAL_PX:
+            lines.append(
+                f"fits badly (usual are 0.2 px, at most {MOST_RESIDUAL_PX:g}): distances would be off by 1 % and more; is "
+                "the board flat, was it held still, and is the lens no fisheye?"
+            )
         if fit.dropped:
             names = ", ".join(f"{name} ({rms:.2f} px)" for name, rms in fit.dropped.items())
             lines.append(f"dropped, they fit no lens: {names}; with them the rms were {fit.all_views_px:.3f} px")

@@ -20,6 +20,8 @@ _NEWTON_STEPS = 12
 # The remaining error is of the order of the last step's square.
 _NEWTON_TOLERANCE = 1e-8
 _MAX_RADIUS = 4.0
+MOST_RESIDUAL_PX = 0.5
+"""A lens that misses the corners of its own calibration by more errs in distances: by 2 % for each pixel."""
 MOST_FOCAL_STD = 0.02
 """Deviation of a focal length, as a share, beyond which a calibration is of no use: distances err by as much."""
 

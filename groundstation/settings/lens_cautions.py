@@ -5,15 +5,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from groundstation.geometry.lens import MOST_FOCAL_STD
+from groundstation.geometry.lens import MOST_FOCAL_STD, MOST_RESIDUAL_PX
 from groundstation.settings.document import KeyPath
 from groundstation.settings.parts import Finding
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.schema import Field
 
 _MOST_CORNER_SHARE = 0.7
-# Distances err by 2 % for each pixel by which a lens misses the corners of its own calibration.
-_MOST_RESIDUAL_PX = 0.5
 
 
 def lens_cautions(field: Field) -> Iterator[Finding]:
@@ -37,7 +35,7 @@ def _odd(lens: CalibrationSettings) -> Iterator[str]:
 
 
 def _inexact(lens: CalibrationSettings) -> Iterator[tuple[str, str]]:
-    if lens.residual_px > _MOST_RESIDUAL_PX:
+    if lens.residual_px > MOST_RESIDUAL_PX:
         text = f"says that the lens fits its own calibration badly (got {lens.residual_px:g}, usual is 0.2)"
         yield "residual_px", f"{text}: distances would be off by 1 % and more; calibrate it again"
     share = 0.0 if lens.std is None else max(lens.std.fx_px / lens.fx_px, lens.std.fy_px / lens.fy_px)

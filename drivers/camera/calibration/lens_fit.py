@@ -15,6 +15,8 @@ from groundstation.geometry.lens import MOST_FOCAL_STD, CameraIntrinsics
 LEAST_VIEWS = 6
 _ROUNDS = 4
 _OUTLIER_RATIO, _OUTLIER_PX = 2.5, 0.3
+# Through a worse lens the detector would refuse its boards (`DetectorSettings.max_residual_px`).
+_USELESS_PX = 1.5
 _TINY = 1e-12
 _NAMES = ("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 
@@ -42,8 +44,8 @@ def fit_lens(
 ) -> LensFit:
     """Return the lens of pictures of (width, height).
 
-    keep_all: drop no view. Raises DriverError when the views are too few, no lens fits them, or they hardly show its
-    focal length.
+    keep_all: drop no view, and take a lens that fits badly. Raises DriverError when the views are too few, no lens fits
+    them, or they hardly show its focal length.
     """
     dropped: dict[str, float] = {}
     kept, all_views_px = list(views), 0.0
@@ -60,6 +62,8 @@ def fit_lens(
     uncertain = max(std[0] / matrix[0, 0], std[1] / matrix[1, 1])
     if not uncertain <= MOST_FOCAL_STD:
         raise DriverError(_too_frontal(uncertain))
+    if rms > _USELESS_PX and not keep_all:
+        raise DriverError(_unfit(rms))
     k1, k2, p1, p2, k3 = distortion.tolist()
     try:
         lens = CameraIntrinsics(
@@ -121,6 +125,13 @@ def _too_frontal(uncertain: float) -> str:
     return (
         f"these views leave the focal length {known} uncertain (at most {MOST_FOCAL_STD:.0%}): "
         "tilt the board by 20 to 40 degrees in several directions"
+    )
+
+
+def _unfit(rms: float) -> str:
+    return (
+        f"the best lens misses the corners by {rms:.1f} px (at most {_USELESS_PX:g}): a fisheye lens, which this model is "
+        "none of? Else a board that is not flat, or that moved before a rolling shutter, or pictures of several cameras"
     )
 
 

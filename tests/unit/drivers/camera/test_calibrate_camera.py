@@ -123,6 +123,21 @@ def test_a_known_lens_is_found_again_within_its_own_deviation(tmp_path, calibrat
     assert len(list((tmp_path / "out" / "lens-judged").iterdir())) == len(POSES)
 
 
+def wavy(picture, phase):
+    """Return a picture as of a board that is bent, in each view another way."""
+    v, u = np.mgrid[0 : LENS.height_px, 0 : LENS.width_px].astype(np.float32)
+    return cv2.remap(picture, u + 1.2 * np.sin(v / 20.0 + phase).astype(np.float32), v, cv2.INTER_LINEAR)
+
+
+def test_a_lens_that_fits_badly_is_written_with_a_warning(tmp_path, calibrated, board_pictures):
+    bent = [wavy(picture, number) for number, picture in enumerate(board_pictures)]
+    code, said, written = calibrated(folder_of(tmp_path / "bent", bent))
+    assert code == 0 and 0.5 < written["residual_px"] < 1.5
+    assert "fits badly" in said and "is the board flat" in said
+    code, said, _ = calibrated(folder_of(tmp_path / "flat", board_pictures), "--force")
+    assert code == 0 and "fits badly" not in said
+
+
 def test_a_view_that_fits_no_lens_is_dropped_by_name(tmp_path, calibrated, board_pictures):
     bent = board_pictures[1].copy()
     columns, rows = np.meshgrid(np.arange(480, dtype=np.float32), np.arange(360, dtype=np.float32))

@@ -61,3 +61,21 @@ def test_of_well_tilted_views_they_are_those_of_opencv() -> None:
         ours = np.array(list(fit.std.values()))
         assert ours[1:] == pytest.approx(stated[1:], rel=0.1)
         assert (ours[0] == ours[1]) == square
+
+
+def test_views_through_a_fisheye_are_refused_with_the_likely_causes() -> None:
+    """Equidistant, 170 degrees wide: a plumb-bob lens fits it to some pixels, which puts boards anywhere."""
+    rng, kept = np.random.default_rng(3), list[KeptView]()
+    while len(kept) < 24:
+        roll, pitch, yaw = np.radians(rng.uniform(-30.0, 30.0, 3))
+        aside, around = math.radians(rng.uniform(0.0, 70.0)), rng.uniform(-math.pi, math.pi)
+        away = (math.sin(aside) * math.cos(around), math.sin(aside) * math.sin(around), math.cos(aside))
+        points = POINTS @ rotation_from_euler(roll, pitch, yaw).T + rng.uniform(0.08, 0.2) * np.array(away)
+        across = np.hypot(points[:, 0], points[:, 1])
+        angle = np.arctan2(across, points[:, 2])
+        pixels = np.array(SIZE) / 2 + 430.0 * (angle / across)[:, None] * points[:, :2]
+        if angle.max() < math.radians(85.0) and LENS.contains(pixels, 10.0).all():
+            kept.append(KeptView(str(len(kept)), pixels))
+    with pytest.raises(DriverError, match=r"misses the corners by \d+\.\d px .*fisheye.*not flat.*rolling shutter"):
+        fit_lens(kept, PATTERN, SIZE)
+    assert fit_lens(kept, PATTERN, SIZE, keep_all=True).lens.residual_px > 1.5

@@ -184,8 +184,8 @@ class CalibrationSession:
         ]
         if lens.residual_px > MOST_RESIDUAL_PX:
             lines.append(
-                f"fits badly (usual are 0.2 px, at most {MOST_RESIDUAL_PX:g}): distances would be off by 1 % and more; is "
-                "the board flat, was it held still, and is the lens no fisheye?"
+                f"fits badly (usual are 0.2 px, at most {MOST_RESIDUAL_PX:g}): distances would be off by 1 % and more; "
+                "is the board flat, was it held still, and is the lens no fisheye?"
             )
         if fit.dropped:
             names = ", ".join(f"{name} ({rms:.2f} px)" for name, rms in fit.dropped.items())

@@ -130,8 +130,9 @@ def _too_frontal(uncertain: float) -> str:
 
 def _unfit(rms: float) -> str:
     return (
-        f"the best lens misses the corners by {rms:.1f} px (at most {_USELESS_PX:g}): a fisheye lens, which this model is "
-        "none of? Else a board that is not flat, or that moved before a rolling shutter, or pictures of several cameras"
+        f"the best lens misses the corners by {rms:.1f} px (at most {_USELESS_PX:g}): a fisheye lens, which this model "
+        "is none of? Else a board that is not flat, or that moved before a rolling shutter, or pictures of several "
+        "cameras"
     )
 
 

@@ -112,9 +112,17 @@ class TagFinder:
         return _each_once(found + self._prints(picture, tag, prediction.window(picture.shape), prediction.radius_px))
 
     def _prints(self, picture: Image, tag: TagSettings, window: Window | None, side: float) -> list[Array]:
-        """Return the corners of a tag's prints in a window; side: their approximate size [px]."""
-        finds = self._detect(picture, tag.dictionary, window, side) if window is not None else []
-        return [corners for number, corners in finds if number == tag.id]
+        """Return the corners of a tag's prints in a window; side: their approximate size [px].
+
+        The finder takes its threshold in squares of fixed sizes, so some prints are found in their own size only.
+        """
+        if window is None:
+            return []
+        for size in (side, _WANTED_PX) if side < _WANTED_PX else (side,):
+            finds = self._detect(picture, tag.dictionary, window, size)
+            if found := [corners for number, corners in finds if number == tag.id]:
+                return found
+        return []
 
     def _everywhere(self, picture: Image) -> dict[str, list[Array]]:
         """Return the corners of all expected tags in the whole picture, by entity."""

@@ -11,6 +11,7 @@ from drivers.camera.convert import stabilized_from_optical
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.prediction import Prediction
 from drivers.camera.settings import DetectorSettings, MarkerSettings, MountSettings, TagSettings
+from drivers.camera.tags import TagFinder
 from groundstation.errors import SettingsError
 from groundstation.geometry.angles import wrap
 from groundstation.geometry.lens import CameraIntrinsics
@@ -169,3 +170,33 @@ def test_one_tag_belongs_to_one_robot():
     with pytest.raises(SettingsError) as caught:
         load_field(find_field("lab"), both)
     assert "DICT_APRILTAG_36H11 7 is already that of drone_1" in caught.value.problems[0]
+
+
+def small_tag(seed):
+    """Return a picture of one small, slanted tag in uneven light, and its rough side [px]."""
+    random, family = np.random.default_rng(seed), FAMILIES[seed % 2]
+    code = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, family)).generateImageMarker(7, 160)
+    card = cv2.copyMakeBorder(code, 30, 30, 30, 30, cv2.BORDER_CONSTANT, value=255)
+    side, turn, slant = random.uniform(16.0, 40.0), random.uniform(0.0, 6.28), random.uniform(0.6, 1.0)
+    scale = side / 160.0 * np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    scale = np.diag([1.0, slant]) @ scale
+    place = np.column_stack((scale, random.uniform((150, 100), (490, 260)) - scale @ (110.0, 110.0)))
+    grey = random.normal(0.0, 30.0, (36, 64)).astype(np.float32)
+    grey = 120.0 + cv2.resize(grey, (640, 360), interpolation=cv2.INTER_CUBIC)
+    shrunk = cv2.warpAffine(card, place, (640, 360), flags=cv2.INTER_AREA)
+    mask = cv2.warpAffine(np.full_like(card, 255), place, (640, 360), flags=cv2.INTER_AREA) / 255.0
+    shown = cv2.GaussianBlur(grey * (1.0 - mask) + (0.5 * shrunk + 50.0) * mask, (0, 0), 0.7)
+    return family, np.clip(shown + random.normal(0.0, 4.0, shown.shape), 0, 255).astype(np.uint8)
+
+
+def test_a_small_tag_that_was_found_is_found_again_in_its_place():
+    """A window is enlarged, which hides some tags from a finder with thresholds in squares of fixed sizes."""
+    found = kept = 0
+    for seed in range(120):
+        family, picture = small_tag(seed)
+        finder = TagFinder((marker(family),))
+        if finder.look(picture, 0, {}, everywhere=True):
+            found += 1
+            kept += bool(finder.look(picture, FRAME_NS, {}, everywhere=False))
+    assert found > 60
+    assert kept == found

@@ -63,6 +63,8 @@ def camera() -> None:
 def view(source: str, calibration: Path | None, output: Path | None, port: int, **options: Any) -> int:
     """Find markers in the pictures of SOURCE; list, draw and show them. Ctrl-C ends it.
 
+    Each picture of a folder is searched all over, those of cameras and video files as often as in flight.
+
     Drawn are corners (a ring on the first), axes, code or id, distance, residual, age, and the windows searched.
     """
     from drivers.camera.calibration.annotate import jpeg_of, save
@@ -85,7 +87,7 @@ def view(source: str, calibration: Path | None, output: Path | None, port: int, 
             for shot in shots(source, None if lens is None else (lens.width_px, lens.height_px)):
                 if lens is not None:
                     require_size(shot, lens, str(calibration))
-                viewer = viewer or DetectorPreview(shot.size, lens, options["square_mm"], *tags)
+                viewer = viewer or DetectorPreview(shot.size, lens, options["square_mm"], *tags, each=shot.alone)
                 look = viewer.look(shot)
                 seen.add(look)
                 if output is not None:

@@ -23,12 +23,16 @@ PATIENCE_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class SourcePicture:
-    """One picture: its name (of a file, else its number), brightness (h, w), when it arrived, and its age then [ms]."""
+    """One picture: its name (of a file, else its number), brightness (h, w), when it arrived, and its age then [ms].
+
+    alone: it is a file of its own, which may have nothing to do with the one before.
+    """
 
     name: str
     grey: Image
     at_s: float
     age_ms: float = 0.0
+    alone: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -63,7 +67,7 @@ def _stored(path: str) -> Iterator[SourcePicture]:
     try:
         for due_s, name, picture in reader.pictures():
             count += 1
-            yield SourcePicture(name, picture.grey(), due_s)
+            yield SourcePicture(name, picture.grey(), due_s, alone=reader.is_folder)
     except DriverError as error:
         raise DriverError(f"{path}: {error}") from None
     if not count:

@@ -19,6 +19,8 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.time_units import NS_PER_S
 
 _SEARCH_RATE_HZ = 2.0
+# More often than pictures of a folder follow each other.
+_EACH_PICTURE_HZ = 1000.0
 # This camera's mounting is unknown: an assumed "down" must not choose between poses here.
 _NOWHERE = Gravity(np.eye(3), 0.0, 0.0, known=False)
 
@@ -65,7 +67,8 @@ class Look:
 class DetectorPreview:
     """Runs the detector over pictures with every code expected, and every tag of the dictionaries.
 
-    lens: None for a camera that is not calibrated: markers are found, but have no distance.
+    lens: None for a camera that is not calibrated: markers are found, but have no distance. each: every picture is
+    searched all over, because none need have to do with the one before; else as often as in flight.
     """
 
     def __init__(
@@ -75,6 +78,7 @@ class DetectorPreview:
         square_mm: float,
         dictionaries: Sequence[str] = (),
         tag_mm: float = 168.0,
+        each: bool = False,
     ) -> None:
         width, height = size
         guess = CameraIntrinsics(width, height, width, width, (width - 1) / 2, (height - 1) / 2)
@@ -86,7 +90,7 @@ class DetectorPreview:
         self._expected = {one.entity: one for one in expected}
         # A lens that is only guessed leaves residuals that are not the board's fault.
         settings = DetectorSettings() if lens is not None else DetectorSettings(max_residual_px=20.0)
-        self._pipeline = Pipeline(self._lens, tuple(expected), settings, _SEARCH_RATE_HZ)
+        self._pipeline = Pipeline(self._lens, tuple(expected), settings, _EACH_PICTURE_HZ if each else _SEARCH_RATE_HZ)
 
     def look(self, shot: SourcePicture) -> Look:
         """Return the results for a picture."""

@@ -29,6 +29,11 @@ class FileReader:
         self.rejected: Counter[str] = Counter()
         self.decoder: PictureDecoder | None = Decoded()
 
+    @property
+    def is_folder(self) -> bool:
+        """Return whether each picture is a file of its own."""
+        return self._path.is_dir()
+
     def interrupt(self) -> None:
         """Do nothing: a file never keeps its reader waiting."""
 

@@ -85,6 +85,18 @@ def test_tags_are_shown_by_their_dictionary(files, capsys, options, told):
     assert told in capsys.readouterr().out
 
 
+def test_every_picture_of_a_folder_is_searched(files, capsys):
+    """Photographs that have nothing to do with each other: the next marker is elsewhere, or not there at all."""
+    plain = np.full((HEIGHT, WIDTH), 110, np.uint8)
+    pictures = [picture(3), plain, np.roll(picture(5), 150, axis=1), tag_picture(), np.roll(picture(9), -150, axis=1)]
+    for number, shown in enumerate(pictures):
+        cv2.imwrite(str(files / "in" / f"p{number}.png"), shown)
+    assert run(["camera", "view", str(files / "in"), "--dictionary", "DICT_APRILTAG_36H11"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    told = ["marker 3 ", "nothing found", "marker 5 ", "tag DICT_APRILTAG_36H11 7 ", "marker 9 "]
+    assert [word in line for word, line in zip(told, lines, strict=False)] == [True] * 5, lines
+
+
 def test_a_mirrored_picture_is_told(files, capsys):
     for number in range(3):
         cv2.imwrite(str(files / "in" / f"p{number}.png"), picture()[:, ::-1])

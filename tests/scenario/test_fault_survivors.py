@@ -100,8 +100,9 @@ def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
 # loses its floor 0.4 s later: it is at rest after 4.5 s (one of 4 seeds with both on one drone). A PX4 that freezes
 # hovers by its own wrong velocity, at up to 0.12 m/s for a moment: at rest after 4.3 s (one of 13). An autopilot whose
 # velocity sticks as it turns rests after 4.9 s.
-# The velocity of the third drifts from the border of the view on, and its belief is 0.5 m off for 1.2 s. The last is stopped without a floor in view; then it hears nothing, keeps the tilt of its last command
-# and flies 1.4 m, at up to 0.4 m/s, until its own firmware has landed it.
+# The velocity of the third drifts from the border of the view on, and its belief is 0.5 m off for 1.2 s.
+# The last is stopped without a floor in view; then it hears nothing, keeps the tilt of its last command and flies
+# 1.4 m, at up to 0.4 m/s, until its own firmware has landed it.
 _FROZEN_TOO = ["uniform_floor", "telemetry_frozen"]
 UNSAFE = {
     "blind_after_it_is_frozen": (48143, {"rest"}, [], "lab", _FROZEN_TOO),

@@ -45,13 +45,14 @@ class TelemetryReturn:
         if not (vehicle.fresh and self._long):
             return {}
         self._back_ns = now_ns if self._back_ns is None else self._back_ns
-        settled = now_ns - self._back_ns >= limits.sound_s * NS_PER_S
+        sound_s = limits.sound_s if self._counted else limits.stands_s
+        settled = now_ns - self._back_ns >= sound_s * NS_PER_S
         doubt = self._doubt(now_ns, settled, vehicle, limits)
         self._long = not settled or bool(doubt)
         self._counted = self._counted and self._long
         if doubt:
             return {Condition.BACK_IN_DOUBT: doubt}
-        return {Condition.TELEMETRY_BACK: f"{limits.sound_s:g} s"} if self._long else {}
+        return {Condition.TELEMETRY_BACK: f"{sound_s:g} s"} if self._long else {}
 
     def _doubt(self, now_ns: int, settled: bool, vehicle: VehicleView, limits: WatchdogLimits) -> str:
         """Return why it does not go on by itself, or ""; who flies it shows in a report that comes once a second."""

@@ -29,7 +29,7 @@ EVIDENCE: dict[Condition, str] = {
     Condition.SENSORS_WRONG: "a BAD sensor, or telemetry without its motion; a silence with a BAD sensor in it "
     "counts in full",
     Condition.TELEMETRY_BACK: "telemetry has lasted for less than 1.5 s without a pause of 0.3 s, after a "
-    "`telemetry_silent` of 0.5 s since the last order to go on",
+    "`telemetry_silent` of 1.0 s since the last order to go on; or for less than 0.8 s, after one of 0.5 s",
     Condition.BACK_IN_DOUBT: "likewise, after the fourth one of 1.0 s within 60 s, no such order since; or after those "
     "1.5 s in a mode that is not ours (MAVLink)",
     Condition.STATE_UNKNOWN: "its state is UNKNOWN or LOST",

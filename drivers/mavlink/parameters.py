@@ -1,6 +1,6 @@
 """Parameters needed for indoor flight on our position, and a vehicle's differences from them.
 
-Reasons and sources, one by one: docs/reference/mavlink.md 5.4.1. Checked with PX4 1.16 and ArduCopter 4.6.
+Reasons and sources, one by one: docs/reference/mavlink.md 5.4.1. Checked with PX4 1.16 and ArduCopter 4.6 and 4.7.
 """
 
 import math
@@ -14,7 +14,7 @@ Version = tuple[int, int]
 # Releases whose parameters were compared with the tables below: first and last of each flavour.
 _CHECKED: dict[Flavour, tuple[Version, Version]] = {
     Flavour.PX4: ((1, 16), (1, 16)),
-    Flavour.ARDUPILOT: ((4, 6), (4, 6)),
+    Flavour.ARDUPILOT: ((4, 6), (4, 7)),
 }
 
 
@@ -24,7 +24,8 @@ class Needed:
 
     accepted: lowest and highest value that are acceptable too; others: acceptable single values; flown: a wider range
     that permits a take-off, but is reported to the operator and changed by `setup`; aliases: names in other releases;
-    optional: a firmware without it flies; bits: only these of a mask must be set, `setup` keeps the others.
+    successor: the parameter that replaces it in later releases, with another unit or meaning; optional: a firmware
+    without it flies; bits: only these of a mask must be set, `setup` keeps the others.
     """
 
     name: str
@@ -37,11 +38,17 @@ class Needed:
     aliases: tuple[str, ...] = ()
     optional: bool = False
     bits: int = 0
+    successor: "Needed | None" = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return its name and its aliases."""
-        return (self.name, *self.aliases)
+        """Return its name, its aliases and those of its successor."""
+        return (self.name, *self.aliases, *(self.successor.names if self.successor is not None else ()))
+
+    def under(self, name: str) -> "Needed":
+        """Return the need that a name of it has: its own, or its successor's."""
+        later = self.successor
+        return later if later is not None and name in later.names else self
 
     def takes(self, value: float) -> bool:
         """Return whether a value is acceptable; one that is no number never is."""
@@ -79,6 +86,7 @@ def _lies_in(span: tuple[float, float], value: float) -> bool:
 
 _NO_RETURN = "a return would climb first, to the ceiling"
 _CLIMBS_ON = "faster, it climbs on for metres when it is landed from a climb that others ordered"
+_IN_TIME = "down in time where it lands without a position"
 _CENTRE = "our positions are those of its centre"
 LOSS = "FS_THR_ENABLE"  # how an ArduPilot reacts to the loss of its transmitter; 0: not at all, and tells nobody
 # WIRE (ArduCopter 4.7, radio.cpp): with 0 a receiver without its transmitter counts as healthy for ever.
@@ -131,11 +139,24 @@ _ARDUPILOT = (
     Needed("COMPASS_USE", 0, "no compass near steel"),
     Needed("COMPASS_USE2", 0, "no compass near steel"),
     Needed("COMPASS_USE3", 0, "no compass near steel"),
-    Needed("ARMING_CHECK", 1048574, "every check by its own bit; without a GPS those of the GPS check nothing"),
+    Needed(
+        "ARMING_CHECK",
+        1048574,
+        "every check by its own bit; without a GPS those of the GPS check nothing",
+        successor=Needed("ARMING_SKIPCHK", 0, "no check is skipped; without a GPS those of the GPS check nothing"),
+    ),
     Needed("GUID_TIMEOUT", 0.5, "time without setpoints before it stops", REAL32, accepted=(0.1, 0.5)),
     Needed("FS_GCS_ENABLE", 5, "ground station lost: land"),
     Needed("FS_GCS_TIMEOUT", 2.0, "time without our heartbeat before that", REAL32, (2.0, 3.0), flown=(2.0, 5.0)),
-    Needed("LAND_SPEED", 70, "down in time where it lands without a position", INT32, (60, 100), flown=(30, 100)),
+    Needed(
+        "LAND_SPEED",
+        70,
+        _IN_TIME,
+        INT32,
+        (60, 100),
+        flown=(30, 100),
+        successor=Needed("LAND_SPD_MS", 0.7, _IN_TIME, REAL32, (0.6, 1.0), flown=(0.3, 1.0)),
+    ),
     Needed("FS_EKF_ACTION", 1, "position lost: land"),
     Needed(
         "FS_EKF_THRESH", 0.8, "with 0 it does not land then, with more than 1 late", REAL32, (0.6, 1), optional=True
@@ -170,7 +191,8 @@ def _overridden(wanted: Iterable[Needed], overrides: Mapping[str, float]) -> tup
         name = next((n for n in need.names if n in left), None)
         if name is not None:
             value, reason = left.pop(name), "as the field file says"
-            need = replace(need, value=value, reason=reason, accepted=None, others=(), flown=None, bits=0)
+            need = replace(need.under(name), value=value, reason=reason, accepted=None, others=(), flown=None)
+            need = replace(need, bits=0, successor=None)
         found.append(need)
     for name, value in left.items():
         kind = INT32 if value == round(value) else REAL32
@@ -180,7 +202,7 @@ def _overridden(wanted: Iterable[Needed], overrides: Mapping[str, float]) -> tup
 
 def overridden(flavour: Flavour, overrides: Mapping[str, float]) -> str:
     """Return the warning for parameters that the field file sets against the needs of indoor flight, or ""."""
-    usual = {name: need for need in needed(flavour, 0) for name in need.names}
+    usual = {name: need.under(name) for need in needed(flavour, 0) for name in need.names}
     bold = [
         f"{n} {v:.7g} instead of {usual[n].wish}" for n, v in overrides.items() if n in usual and not usual[n].takes(v)
     ]
@@ -203,10 +225,11 @@ def difference(wanted: Needed, found: Mapping[str, float]) -> str:
     name = next((n for n in wanted.names if n in found), None)
     if name is None:
         return f"{wanted.name} is missing, needs {wanted.wish} ({wanted.reason})"
-    return "" if wanted.takes(found[name]) else f"{name} is {found[name]:.7g}, needs {wanted.wish} ({wanted.reason})"
+    need = wanted.under(name)
+    return "" if need.takes(found[name]) else f"{name} is {found[name]:.7g}, needs {need.wish} ({need.reason})"
 
 
 def fault(wanted: Needed, found: Mapping[str, float]) -> str:
     """Return the difference of a parameter that was found, if it forbids a take-off, or ""."""
-    value = next(found[name] for name in wanted.names if name in found)
-    return difference(wanted, found) if wanted.forbids(value) else ""
+    name = next(name for name in wanted.names if name in found)
+    return difference(wanted, found) if wanted.under(name).forbids(found[name]) else ""

@@ -36,7 +36,7 @@ _SLOW_TOLD_NS = 30 * NS_PER_S
 _PARAM_BURST = 4
 _PARAM_TRIES = 20
 _ORIGIN_TRIES_PX4 = 5
-_CHECKED_WITH = "PX4 1.16 or ArduCopter 4.6"
+_CHECKED_WITH = "PX4 1.16 or ArduCopter 4.6 or 4.7"
 _VERSION_PERIOD_NS, _VERSION_TRIES = NS_PER_S, 5
 # After this many unanswered requests a parameter is also requested by its other names.
 _ALIAS_AFTER = 3
@@ -184,7 +184,8 @@ class MavlinkSession:
 
     def _note_change(self, wanted: parameters.Needed, name: str, before: float, value: float) -> None:
         """Report a value that somebody else changed: autopilots report it on all their links."""
-        needs = "" if wanted.takes(value) else f", needs {wanted.wish} ({wanted.reason})"
+        need = wanted.under(name)
+        needs = "" if need.takes(value) else f", needs {need.wish} ({need.reason})"
         self.notes.append(f"somebody changed its parameter {name} from {before:.7g} to {value:.7g}{needs}")
 
     def _note_doubtful(self, wanted: parameters.Needed, found: dict[str, float]) -> None:

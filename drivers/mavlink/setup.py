@@ -77,10 +77,10 @@ class ParameterSetup:
     def differences(self) -> Iterator[ParameterDifference]:
         """Yield the differences from the needed values."""
         for wanted in self._needed(self._flavour is Flavour.ARDUPILOT and self._receives()):
-            value = self._read(wanted)
-            text = difference(wanted, {} if value is None else {wanted.name: value})
+            name, value = self._read(wanted)
+            text = difference(wanted, {} if value is None else {name: value})
             if text and not (value is None and wanted.optional):
-                yield ParameterDifference(wanted.mending(value), value, text)
+                yield ParameterDifference(wanted.under(name).mending(value), value, text)
 
     def _receives(self) -> bool:
         """Return whether the vehicle reports that it has heard a transmitter since its start."""
@@ -104,13 +104,14 @@ class ParameterSetup:
         value = self._exchange(wanted, ParamSet(self._system, AUTOPILOT_COMPONENT, name, carried, kind), _TRIES)
         return value is not None and not difference(wanted, {wanted.name: value})
 
-    def _read(self, wanted: Needed) -> float | None:
+    def _read(self, wanted: Needed) -> tuple[str, float | None]:
+        """Return the name that it answers to, and its value, None if to none."""
         for tries in (1, _TRIES - 1):
             for name in wanted.names:
                 value = self._exchange(wanted, ParamRequestRead(self._system, AUTOPILOT_COMPONENT, name, -1), tries)
                 if value is not None:
-                    return value
-        return None
+                    return name, value
+        return wanted.name, None
 
     def _exchange(self, wanted: Needed, message: ParamRequestRead | ParamSet, tries: int) -> float | None:
         for _ in range(tries):

@@ -43,6 +43,25 @@ def test_an_alias_is_named_as_it_was_read():
     assert text == "GPS_TYPE is 1, needs 0 (no GPS indoors)"
 
 
+@pytest.mark.parametrize(
+    ("name", "good", "warned", "refused"),
+    [("LAND_SPEED", 70, 50, 20), ("LAND_SPD_MS", 0.7, 0.5, 0.2), ("ARMING_SKIPCHK", 0, None, 4)],
+)
+def test_a_parameter_of_a_later_release_is_judged_by_its_own_unit(name, good, warned, refused):
+    """ArduCopter 4.7 renamed both: m/s instead of cm/s, checks to skip instead of checks to perform."""
+    wanted = of(name, Flavour.ARDUPILOT)
+    assert difference(wanted, {name: good}) == ""
+    assert fault(wanted, {name: refused}).startswith(f"{name} is {refused}, needs ")
+    if warned is not None:
+        assert difference(wanted, {name: warned}) and not fault(wanted, {name: warned})
+
+
+def test_the_field_file_may_name_a_parameter_of_a_later_release():
+    wanted = of("LAND_SPD_MS", Flavour.ARDUPILOT, LAND_SPD_MS=0.5)
+    assert difference(wanted, {"LAND_SPD_MS": 0.5}) == "" and difference(wanted, {"LAND_SPD_MS": 0.7})
+    assert "LAND_SPD_MS 0.5 instead of 0.6 to 1" in overridden(Flavour.ARDUPILOT, {"LAND_SPD_MS": 0.5})
+
+
 def test_the_field_file_has_the_last_word_and_a_warning():
     wanted = of("EKF2_MAG_TYPE", EKF2_MAG_TYPE=0)
     assert difference(wanted, {"EKF2_MAG_TYPE": 0}) == ""

@@ -105,6 +105,25 @@ def test_an_older_or_newer_name_counts_as_well() -> None:
     assert not session.unread and not session.problems
 
 
+def test_a_copter_of_4_7_is_read_by_its_own_names() -> None:
+    session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
+    session.hear_version(0x04070000)
+    session.hear_origin()
+    values = {n.name: n.value for one in needed(Flavour.ARDUPILOT, 255) for n in (one.successor or one,)}
+    values["LAND_SPD_MS"] = 0.5
+    for turn in range(1500):
+        for message in session.step(10_000 * MS + turn * 10 * MS, 0, requests):
+            if isinstance(message, ParamRequestRead) and message.param_id in values:
+                session.hear_parameter(ParamValue(message.param_id, values[message.param_id], REAL32, 1, 0))
+    assert "ARMING_SKIPCHK" in values and not session.unread and not session.problems
+    assert session.detail(requests) == ""
+    (told,) = session.notes
+    assert told.startswith("parameter LAND_SPD_MS is 0.5, needs 0.6 to 1 (")
+    session.hear_parameter(ParamValue("ARMING_SKIPCHK", 64.0, REAL32, 1, 0))
+    assert session.notes[-1].startswith("somebody changed its parameter ARMING_SKIPCHK from 0 to 64, needs 0 (")
+    assert session.problems[0].startswith("ARMING_SKIPCHK is 64, needs 0 (")
+
+
 def test_a_value_that_setup_would_change_is_told_once_and_flown() -> None:
     session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
     session.hear_origin()

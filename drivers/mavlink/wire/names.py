@@ -164,15 +164,25 @@ class CopterMode(IntEnum):
     GUIDED = 4
     LOITER = 5
     RTL = 6
+    CIRCLE = 7
     LAND = 9
     DRIFT = 11
     SPORT = 13
+    FLIP = 14
+    AUTOTUNE = 15
     POSHOLD = 16
     BRAKE = 17
+    THROW = 18
+    AVOID_ADSB = 19
     GUIDED_NOGPS = 20
     SMART_RTL = 21
     FLOWHOLD = 22
+    FOLLOW = 23
+    ZIGZAG = 24
+    SYSTEMID = 25
+    AUTOROTATE = 26
     AUTO_RTL = 27
+    TURTLE = 28
 
 
 def px4_mode(main: int, sub: int = 0) -> int:

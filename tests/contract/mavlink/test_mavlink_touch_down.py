@@ -4,6 +4,7 @@ import pytest
 
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.names import CopterMode, Flavour, Landed, MavCmd, Px4Main, px4_mode
+from drivers.mavlink.wire.telemetry import LocalPositionNed
 from groundstation.bus.messages import AckStage, Verb
 from groundstation.bus.topics import COMMAND_ACK
 
@@ -62,6 +63,19 @@ def test_one_that_stays_on_the_floor_is_landed(sinking):
     """Its pilot landed it, or our claim came too late to catch it."""
     rig = sinking(0.0)
     rig.until(lambda: rig.emulator.firmware.mode == rig.emulator.firmware.landing, 0.8)
+    assert rig.host.watchdog.reason == "it has come down to the floor"
+
+
+def test_one_that_fell_on_the_floor_is_not_said_to_climb(sinking, monkeypatch):
+    """As an ArduCopter 4.7 that another station put into STABILIZE: its estimator swung up as it hit the floor."""
+    rig = sinking(0.0)
+    take = rig.vehicle._take
+
+    def swings_up(now_ns, message):
+        take(now_ns, message._replace(vz=-1.1) if isinstance(message, LocalPositionNed) else message)
+
+    monkeypatch.setattr(rig.vehicle, "_take", swings_up)
+    rig.until(lambda: rig.mode == "LANDING", 0.8)
     assert rig.host.watchdog.reason == "it has come down to the floor"
 
 

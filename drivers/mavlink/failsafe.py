@@ -6,6 +6,7 @@ from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
+from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT
 from drivers.mavlink.wire.verification import Signing
 from drivers.vehicle_settings import VehicleLimits
 
@@ -21,7 +22,16 @@ def hover_and_land(systems: Sequence[int], *, signed: bool = False) -> tuple[byt
 
     signed: with room for signatures, which the sender makes (`wire/signature.py`).
     """
-    encoder = FrameEncoder(_SYSTEM, _COMPONENT, Signing(bytes(32), 0) if signed else None)
+    encoder = _encoder(signed)
     stop = [setpoint_from_velocity(system, 0, (0.0, 0.0, 0.0), 0.0, VehicleLimits()) for system in systems]
     land = [command_to(system, MavCmd.NAV_LAND) for system in systems]
     return b"".join(map(encoder.encode, stop)), b"".join(map(encoder.encode, land))
+
+
+def heartbeat(*, signed: bool = False) -> bytes:
+    """Return the driver's heartbeat; signed: as above."""
+    return _encoder(signed).encode(OUR_HEARTBEAT)
+
+
+def _encoder(signed: bool) -> FrameEncoder:
+    return FrameEncoder(_SYSTEM, _COMPONENT, Signing(bytes(32), 0) if signed else None)

@@ -6,6 +6,7 @@ No pymavlink here: the guardian is small. Reason: docs/decisions/0084-a-commandi
 import json
 import os
 import socket
+import time
 from collections.abc import Iterator, Sequence
 
 from drivers.mavlink.links.tty import open_raw
@@ -17,13 +18,19 @@ from groundstation.errors import DriverError
 
 # Larger datagrams are fragmented on usual networks: one lost fragment would lose the orders to all vehicles.
 _MOST_BYTES = 1200
+# WIRE (ArduCopter 4.7; docs/reference/mavlink.md 5.3): 2 s after the last heartbeat it holds a landing until 4 s after
+# that began, which is 0.5 s after the driver's last word. One that does not obey still lands by that failsafe.
+_HEARTBEATS_S = 3.0
+# It sends many times a second: after such a pause it speaks for a driver anew.
+_ANEW_S = 1.0
 
 
 class MavlinkFailsafe:
     """Sends prepared frames; created before anything flies, because the key must be at hand when it is needed.
 
-    way: JSON with `serial` (DEVICE:BAUD, or "" for UDP), `key_file` ("" for unsigned frames) and `interface` (network
-    adapter, "" for any). speaker: a distinct number for each process that may send, used as the signature's link id.
+    For its first 3 s a heartbeat comes first. way: JSON with `serial` (DEVICE:BAUD, or "" for UDP), `key_file` ("" for
+    unsigned frames), `interface` (network adapter, "" for any) and `heartbeat` (the frame, hexadecimal, "" for none).
+    speaker: a distinct number for each process that may send, used as the signature's link id.
     """
 
     def __init__(self, way: str, speaker: int) -> None:
@@ -31,6 +38,8 @@ class MavlinkFailsafe:
         self._serial, key_file = str(told["serial"]), str(told["key_file"])
         self._key = read_key(key_file) if key_file else b""
         self._speaker, self._stamp, self._fd = speaker, 0, -1
+        self._heartbeat = bytes.fromhex(str(told.get("heartbeat", "")))
+        self._began_s = self._sent_s = -_ANEW_S
         self._clock = SigningClock()
         self._socket = None if self._serial else socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         if self._socket is not None:
@@ -43,6 +52,7 @@ class MavlinkFailsafe:
 
     def send(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send frames to every address, or into the line; raises OSError if that fails."""
+        datagram = self._due_heartbeat(time.monotonic()) + datagram
         if self._key:
             # WIRE (docs/reference/mavlink.md 5.9): times must grow for each sender and link, and a new link may begin
             # at most a minute before the newest time that the vehicle knows: one that its
@@ -53,6 +63,12 @@ class MavlinkFailsafe:
             self._write(datagram)
             return
         send_to_all(self._socket, tuple(_in_parts(datagram)), addresses)
+
+    def _due_heartbeat(self, now_s: float) -> bytes:
+        if now_s - self._sent_s >= _ANEW_S:
+            self._began_s = now_s
+        self._sent_s = now_s
+        return self._heartbeat if now_s - self._began_s < _HEARTBEATS_S else b""
 
     def _write(self, datagram: bytes) -> None:
         """Write into the device, opened beside or after the silent driver; after a failure it is reopened."""

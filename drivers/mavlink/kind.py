@@ -130,12 +130,13 @@ def _vehicle(order: VehicleOrder) -> VehicleSettings:
 
 def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
     # Only here: pymavlink's dialect is slow to load.
-    from drivers.mavlink.failsafe import HOVERS_S, hover_and_land
+    from drivers.mavlink.failsafe import HOVERS_S, heartbeat, hover_and_land
 
     mavlink = _own(orders[0])
-    hover, land = hover_and_land([_own(order).system_id for order in orders], signed=bool(mavlink.key_file))
-    interface = orders[0].drone.interface
-    way = json.dumps({"serial": mavlink.serial, "key_file": mavlink.key_file, "interface": interface})
+    signed = bool(mavlink.key_file)
+    hover, land = hover_and_land([_own(order).system_id for order in orders], signed=signed)
+    places = {"serial": mavlink.serial, "key_file": mavlink.key_file, "interface": orders[0].drone.interface}
+    way = json.dumps(places | {"heartbeat": heartbeat(signed=signed).hex()})
     return StopDatagrams(mavlink.port, hover, land, _TRANSPORT, way, mavlink.listen, HOVERS_S)
 
 

@@ -28,7 +28,7 @@ _PARAM_PERIOD_NS = 500 * NS_PER_MS
 # arrive.
 _HEARTBEAT_NS = 250 * NS_PER_MS
 _DISCONNECTED_NS = 2 * NS_PER_S
-# Several orders to land went unanswered by then.
+# Several orders to land went unanswered by then; one that obeyed them does not pause any more (failsafe_transport.py).
 _DEAF_NS = 3 * NS_PER_S
 # Least time without a stream before it is requested again, in periods of its own.
 _STREAM_NS, _PERIODS = 3 * NS_PER_S, 5
@@ -216,13 +216,14 @@ class MavlinkSession:
         """Note that the origin is set."""
         self._has_origin = True
 
-    def step(self, now_ns: int, silence_ns: int, requests: Requests, deaf: bool = False) -> list[Message]:
+    def step(self, now_ns: int, silence_ns: int, requests: Requests, deaf_ns: int = 0) -> list[Message]:
         """Return the messages to send now; commands go through `requests`.
 
-        deaf: it is to land, and nothing of it is heard: without our heartbeats an ArduPilot lands by itself.
+        deaf_ns: for so long it is to land, and nothing of it is heard: without our heartbeats an ArduPilot lands by
+        itself.
         """
         messages: list[Message] = []
-        withheld = deaf and self._flavour is Flavour.ARDUPILOT and silence_ns > _DEAF_NS
+        withheld = self._flavour is Flavour.ARDUPILOT and deaf_ns > _DEAF_NS
         if now_ns >= self._next_heartbeat_ns and not withheld:
             self._next_heartbeat_ns = now_ns + _HEARTBEAT_NS
             messages.append(telemetry.OUR_HEARTBEAT)

@@ -233,7 +233,8 @@ class MavlinkVehicle:
         # Others on its line get heartbeats of their own: theirs reach it too, and keep it up.
         lands = decision.mode is DriverMode.LANDING and decision.action is Action.LAND
         deaf = lands and not self.orders.pilot.moves(known.custom_mode)
-        messages = self._session.step(now_ns, silence_ns, self._requests, deaf)
+        deaf_ns = min(silence_ns, now_ns - decision.entered_ns) if deaf else 0
+        messages = self._session.step(now_ns, silence_ns, self._requests, deaf_ns)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
         landed = self._flight.landed(now_ns, known)

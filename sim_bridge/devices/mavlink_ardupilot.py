@@ -18,7 +18,7 @@ _REACHED_M = 0.08
 # Measured after the last pose.
 _EKF_FAILSAFE_S = 8.0
 _STOPPED_AIDING_S = 15.0
-# Source (mode_land.cpp): a landing by a failsafe holds its place before it descends.
+# WIRE (ArduCopter 4.7, mode_land.cpp; seen): a failsafe makes a landing hold its place until so long after it began.
 _LANDS_AFTER_S = 4.0
 _LEVEL = (Mode.STABILIZE, Mode.ALT_HOLD)
 _LANDS = 3  # of FS_THR_ENABLE
@@ -46,6 +46,7 @@ class ArduCopter(AutopilotFirmware):
         self._paused = False
         self._ground_lost = self._aiding_stopped = False
         self._descends_s: float | None = None
+        self._landing_since_s = 0.0
         self._radio_lost = False
 
     @property
@@ -169,12 +170,16 @@ class ArduCopter(AutopilotFirmware):
             self._climb_to_m = None
             self._paused = False
         self._descends_s = None
+        if mode != self.mode:
+            self._landing_since_s = self.now_s
         super().enter(mode)
 
     def _fail_safe(self) -> None:
         if self.mode != Mode.LAND:
             self.enter(Mode.LAND)
-            self._descends_s = self.now_s + _LANDS_AFTER_S
+        until_s = self._landing_since_s + _LANDS_AFTER_S
+        if self.now_s < until_s:
+            self._descends_s = until_s
             self.copter.steer(Steering.HOLD)
 
     def step(self, now_s: float, ground_silence_s: float) -> None:
@@ -228,8 +233,9 @@ class ArduCopter(AutopilotFirmware):
         elif not self._failed and self.parameters["FS_EKF_THRESH"] > 0:
             self._failed = True
             self.say(2, "EKF variance")
-            self.say(2, "EKF Failsafe: changed to LAND Mode")
-            self._fail_safe()
+            self.say(2, "EKF Failsafe" if self.mode == Mode.LAND else "EKF Failsafe: changed to LAND Mode")
+            if self.mode != Mode.LAND:  # source (ekf_check.cpp): a landing only goes on without a position
+                self._fail_safe()
         elif aided_s > _STOPPED_AIDING_S and not self._aiding_stopped:
             self._aiding_stopped = True
             self.say(4, "EKF3 IMU0 stopped aiding")

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from drivers.mavlink.failsafe import heartbeat, hover_and_land
 from drivers.mavlink.wire.flight import VisionPositionEstimate, command_to
 from drivers.mavlink.wire.frames import FrameEncoder, id_of
 from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
@@ -157,3 +158,18 @@ def test_a_deaf_and_silent_ardupilot_gets_no_heartbeats_and_so_lands_by_itself(r
     rig.run(8.0)
     assert rig.mode == "LANDING"
     assert (firmware.mode == firmware.landing) is not pilot
+
+
+@pytest.mark.parametrize("heartbeats_s", [0.0, 3.0])
+def test_an_ardupilot_that_lands_without_its_driver_pauses_unless_a_heartbeat_was_heard(rig_of, heartbeats_s):
+    """As seen with ArduCopter 4.7: its ground-station failsafe holds a landing until 4 s after that began."""
+    rig = rig_of("ardupilot")
+    rig.track_on()
+    rig.run(2.0)
+    rig.link.send = lambda system, message: None
+    _, land = hover_and_land([11])
+    for turn in range(340):
+        if turn % 10 == 0:
+            rig.emulator.take((heartbeat() if turn * 0.01 < heartbeats_s else b"") + land, GROUND)
+        rig.run(0.01)
+    assert rig.body.on_ground is (heartbeats_s > 0.0)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.mavlink.failsafe import heartbeat
 from drivers.mavlink.failsafe_transport import MavlinkFailsafe
 from groundstation.errors import DriverError
 
@@ -117,3 +118,26 @@ def test_as_many_whole_frames_go_together_as_fit_in_a_usual_network(payloads, si
     assert [len(udp.recv(4096)) for _ in sizes] == sizes
     transport.close()
     udp.close()
+
+
+def test_a_heartbeat_comes_first_for_three_seconds_of_each_spell(monkeypatch):
+    """Without one an ArduPilot pauses the landing that it began; one that does not obey must miss them soon."""
+    transport, now_s = (
+        MavlinkFailsafe(json.dumps({"serial": "", "key_file": "", "heartbeat": frame(9).hex()}), 2),
+        [0.0],
+    )
+    monkeypatch.setattr("drivers.mavlink.failsafe_transport.time.monotonic", lambda: now_s[0])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        vehicle.settimeout(2.0)
+        for at_s, expected in ((10.0, 9), (10.7, 9), (11.4, 9), (12.1, 9), (12.9, 9), (13.1, 1), (13.9, 1), (20.0, 9)):
+            now_s[0] = at_s
+            transport.send(frame(1), [vehicle.getsockname()])
+            assert vehicle.recv(64)[1] == expected
+    transport.close()
+
+
+def test_supervisor_and_guardian_are_given_the_drivers_heartbeat():
+    signed = heartbeat(signed=True)
+    assert len(signed) == len(heartbeat()) + 13 and signed[7] == 0, "the number of HEARTBEAT"
+    assert heartbeat()[5:7] == bytes((255, 190)), "the ids that its vehicles count"

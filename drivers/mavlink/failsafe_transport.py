@@ -20,7 +20,7 @@ from groundstation.errors import DriverError
 _MOST_BYTES = 1200
 # WIRE (ArduCopter 4.7; docs/reference/mavlink.md 5.3): 2 s after the last heartbeat it holds a landing until 4 s after
 # that began, which is 0.5 s after the driver's last word. One that does not obey still lands by that failsafe.
-_HEARTBEATS_S = 3.0
+HEARTBEATS_S = 3.0
 # It sends many times a second: after such a pause it speaks for a driver anew.
 _ANEW_S = 1.0
 
@@ -68,7 +68,7 @@ class MavlinkFailsafe:
         if now_s - self._sent_s >= _ANEW_S:
             self._began_s = now_s
         self._sent_s = now_s
-        return self._heartbeat if now_s - self._began_s < _HEARTBEATS_S else b""
+        return self._heartbeat if now_s - self._began_s < HEARTBEATS_S else b""
 
     def _write(self, datagram: bytes) -> None:
         """Write into the device, opened beside or after the silent driver; after a failure it is reopened."""

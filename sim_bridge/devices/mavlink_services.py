@@ -25,7 +25,7 @@ _ALL = 0
 _FOR_ALL = (f.SetPositionTargetLocalNed, f.SetPositionTargetGlobalInt, s.Ping)
 _COMMANDS_FOR_ALL = (MavCmd.REQUEST_AUTOPILOT_CAPABILITIES, MavCmd.REQUEST_PROTOCOL_VERSION)
 # WIRE (MAV_MISSION_RESULT).
-_MISSION_ACCEPTED, _MISSION_ERROR, _MISSION_UNSUPPORTED = 0, 1, 3
+_MISSION_ACCEPTED, _MISSION_UNSUPPORTED, _NO_SUCH_ITEM = 0, 3, 13
 _POLE, _ROUND = 900_000_000, 1_800_000_000  # 1e-7 degrees
 _FRESH_S = 0.5
 _GO_THERE = 2  # of a mission item's `current`
@@ -107,9 +107,9 @@ class Services:
             case s.MissionRequestList():
                 yield s.MissionCount(frame.system, frame.component, 0, message.mission_type)
             case s.MissionRequestInt() if not self._px4:
-                # WIRE (source): ArduPilot 4.5 repeats how many there are; PX4 ignores what it did not announce.
+                # WIRE (ArduCopter 4.7, seen): it repeats how many there are. PX4 ignores what it did not announce.
                 yield s.MissionCount(frame.system, frame.component, 0, message.mission_type)
-                yield s.MissionAck(frame.system, frame.component, _MISSION_ERROR, message.mission_type)
+                yield s.MissionAck(frame.system, frame.component, _NO_SUCH_ITEM, message.mission_type)
             case f.MissionItem() if not self._px4 and message.current == _GO_THERE:
                 yield s.MissionAck(frame.system, frame.component, self._guide(message), 0)
             case s.MissionCount() | s.MissionClearAll():

@@ -25,7 +25,8 @@ numba_cache.activate()  # before the kernels are imported: otherwise they would 
 from firmware_room import Room  # noqa: E402
 from firmware_seat import Seat  # noqa: E402
 
-from drivers.mavlink.failsafe import HOVERS_S, hover_and_land  # noqa: E402
+from drivers.mavlink.failsafe import HOVERS_S, heartbeat, hover_and_land  # noqa: E402
+from drivers.mavlink.failsafe_transport import HEARTBEATS_S  # noqa: E402
 from groundstation.bus.messages import Verb  # noqa: E402
 
 # Drones of the mixed team; the other ones are emulated.
@@ -107,7 +108,8 @@ class Course:
         hover, land = hover_and_land([self._seat.system])
         link: Any = self._seat.fleet.link
         if elapsed_s > GUARDIAN_SPEAKS_S:
-            link.send_raw(self._seat.system, hover if elapsed_s < HOVERS_S else land)
+            beat = heartbeat() if elapsed_s < GUARDIAN_SPEAKS_S + HEARTBEATS_S else b""
+            link.send_raw(self._seat.system, beat + (hover if elapsed_s < HOVERS_S else land))
 
     def figures(self) -> Figures:
         """Return the figures of take-off and tracking."""

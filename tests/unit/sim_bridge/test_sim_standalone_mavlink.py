@@ -83,7 +83,7 @@ def test_missions_are_none_and_uploads_are_refused_not_ignored(room: Room) -> No
     assert room.ask(s.MissionCount(1, 1, 3, 0)) == [s.MissionAck(255, 190, 3, 0)]
     assert room.ask(s.MissionClearAll(1, 1, 1)) == [s.MissionAck(255, 190, 0, 1)]
     px4 = room.vehicle.firmware.flavour.name == "PX4"
-    none = [s.MissionCount(255, 190, 0, 0), s.MissionAck(255, 190, 1, 0)]
+    none = [s.MissionCount(255, 190, 0, 0), s.MissionAck(255, 190, 13, 0)]
     assert room.ask(s.MissionRequestInt(1, 1, 0, 0)) == ([] if px4 else none)
 
 

@@ -290,7 +290,7 @@ def test_an_origin_off_the_earth_is_not_taken(bench):
 
 def test_an_item_of_no_mission(bench, flavour):
     answers = bench.say(s.MissionRequestInt(5, 1, 7))
-    assert [m.type for m in answers if isinstance(m, s.MissionAck)] == ([] if flavour == "px4" else [1])
+    assert [m.type for m in answers if isinstance(m, s.MissionAck)] == ([] if flavour == "px4" else [13])
 
 
 def test_a_take_off_in_a_wrong_frame_is_denied_by_an_ardupilot(hand):

@@ -1,4 +1,4 @@
-"""Sightings of a target that teach nothing about velocities: only a robot that nobody sees sees it (decision 0376).
+"""Sightings of a target that teach nothing about velocities: only a robot that nobody sees sees it (decision 0374).
 
 Such a robot sees the target move relative to itself. It cannot know which of the two moved otherwise than predicted; a
 target that turns does so more often, and by more, than a model with white acceleration noise expects.

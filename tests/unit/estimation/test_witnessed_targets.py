@@ -1,4 +1,4 @@
-"""A target that turns, seen by a robot that nobody sees, does not teach that robot a wrong velocity (0376)."""
+"""A target that turns, seen by a robot that nobody sees, does not teach that robot a wrong velocity (0374)."""
 
 import math
 

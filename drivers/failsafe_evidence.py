@@ -245,13 +245,13 @@ class Evidence:
 
     def _observe_silence(self, at: Situation, limits: WatchdogLimits) -> None:
         """Note what a silence of the telemetry leads to; if a part of it was wrong values, all of it counts as that."""
-        silent = Condition.TELEMETRY_SILENT
-        charged_s = self.charged_s.get(silent, 0.0)
+        silent, wrong = Condition.TELEMETRY_SILENT, Condition.SENSORS_WRONG
+        charged_s = self.charged_s.get(silent, 0.0) - self._pardoned_s.get(silent, 0.0)
         if self._return.is_doubted(charged_s, at.vehicle) and silent in self.holding:
-            self.holding.setdefault(Condition.SENSORS_WRONG, self.holding[silent])
-            self.charged_s[Condition.SENSORS_WRONG] = max(charged_s, self.charged_s.get(Condition.SENSORS_WRONG, 0.0))
-        lasted_s = charged_s - self._pardoned_s.get(silent, 0.0)
-        self.holding |= self._return.step(at.now_ns, lasted_s, at.mode is DriverMode.TRACK, at.vehicle, limits)
+            self.holding.setdefault(wrong, self.holding[silent])
+            as_wrong_s = charged_s + self._pardoned_s.get(wrong, 0.0)
+            self.charged_s[wrong] = max(as_wrong_s, self.charged_s.get(wrong, 0.0))
+        self.holding |= self._return.step(at.now_ns, charged_s, at.mode is DriverMode.TRACK, at.vehicle, limits)
 
     def against_s(self, row: Failsafe) -> float | None:
         """Return how long a row's condition has lasted [s]: since the last order that ends the row, if one does."""

@@ -1,27 +1,48 @@
 """Whether a vehicle goes on by itself after its telemetry was silent: if its radio paused, and not too often. Pure."""
 
+from dataclasses import dataclass
+
 from drivers.failsafe_table import Condition
 from drivers.watchdog_types import VehicleView, WatchdogLimits
 from groundstation.time_units import NS_PER_S
 
+# After so long a silence it has the second time to stand: it may have heard nothing either, and flown on.
+_LONG_S, _STANDS_S = 0.5, 0.8
+# After one that would need an order if its values were wrong, it has to be heard for this time without a gap; that is
+# long enough for a heartbeat of 1 Hz to tell who flies it.
+_LASTS_S = 1.5
+# It waits for an order where that is not reached within the first, or after more such silences within the third.
+_LASTS_WITHIN_S, _TIMES, _TIMES_WITHIN_S = 10.0, 3, 60.0
+
+
+@dataclass(slots=True)
+class _Wait:
+    """Of a vehicle that was silent: since when, and whether others flew it before that."""
+
+    since_ns: int
+    foreign: bool
+    back_ns: int | None = None
+    needs_to_last: bool = False
+
+    @property
+    def lasts_s(self) -> float:
+        """Return how long it has to be heard before it goes on."""
+        return _LASTS_S if self.needs_to_last else _STANDS_S
+
 
 class TelemetryReturn:
-    """Call `is_doubted` and `step` once a turn, `forget` at an order to go on.
-
-    A silence is long from `sound_after_s` on, and counts from `resume_within_s` on; a shorter one ends with its first
-    packet.
-    """
+    """Call `is_doubted` and `step` once a turn, `forget` at an order to go on. Silences begin 0.3 s after a packet."""
 
     def __init__(self) -> None:
-        self._doubted = False
-        self._long = self._counted = False
-        self._back_ns: int | None = None
-        self._times_ns: list[int] = []
+        self.forget()
+        self._foreign = False
 
     def forget(self) -> None:
-        """Begin anew: an order to go on ends the wait, and permits as many returns as ever."""
-        self._long = self._counted = False
-        self._back_ns, self._times_ns = None, []
+        """Begin anew: an order to go on ends the wait and all doubt, and permits as many returns as ever."""
+        self._doubted = self._counted = False
+        self._silent_ns: int | None = None
+        self._wait: _Wait | None = None
+        self._times_ns: list[int] = []
 
     def is_doubted(self, charged_s: float, vehicle: VehicleView) -> bool:
         """Return whether values that cannot be true came in the present silence; charged_s: its duration, 0: none."""
@@ -29,35 +50,54 @@ class TelemetryReturn:
         return self._doubted
 
     def step(
-        self, now_ns: int, lasted_s: float, tracks: bool, vehicle: VehicleView, limits: WatchdogLimits
+        self, now_ns: int, charged_s: float, tracks: bool, vehicle: VehicleView, limits: WatchdogLimits
     ) -> dict[Condition, str]:
-        """Return the conditions that a silence leaves behind; lasted_s: its duration since the last order to go on.
+        """Return the conditions that a silence leaves behind; charged_s: of silences since the last order to go on.
 
         tracks: its mode is TRACK; only in that is there anything to go on with.
         """
-        self._long, self._counted = self._long and tracks, self._counted and tracks
+        if not tracks:
+            self._wait = None
         if not vehicle.fresh:
-            self._back_ns = None
-            self._long = tracks and (self._long or lasted_s >= limits.sound_after_s)
-            if self._long and not self._counted and lasted_s >= limits.resume_within_s:
-                self._counted = True
-                self._times_ns.append(now_ns)
-        if not (vehicle.fresh and self._long):
+            self._hear_nothing(now_ns, charged_s, tracks, limits)
             return {}
-        self._back_ns = now_ns if self._back_ns is None else self._back_ns
-        sound_s = limits.sound_s if self._counted else limits.stands_s
-        settled = now_ns - self._back_ns >= sound_s * NS_PER_S
-        doubt = self._doubt(now_ns, settled, vehicle, limits)
-        self._long = not settled or bool(doubt)
-        self._counted = self._counted and self._long
+        self._silent_ns = None
+        if self._wait is None:
+            self._foreign = vehicle.foreign
+            return {}
+        return self._hear(now_ns, self._wait, vehicle)
+
+    def _hear_nothing(self, now_ns: int, charged_s: float, tracks: bool, limits: WatchdogLimits) -> None:
+        if self._silent_ns is None:
+            self._silent_ns, self._counted = now_ns, False
+        if tracks and self._wait is None and charged_s >= _LONG_S:
+            self._wait = _Wait(self._silent_ns, self._foreign)
+        if (wait := self._wait) is None:
+            return
+        silent_s = (now_ns - self._silent_ns) / NS_PER_S
+        wait.needs_to_last = wait.needs_to_last or charged_s >= limits.resume_within_s
+        if wait.needs_to_last or silent_s >= _LONG_S:
+            wait.back_ns = None
+        if not self._counted and silent_s >= limits.resume_within_s:
+            self._counted = True
+            self._times_ns.append(now_ns)
+
+    def _hear(self, now_ns: int, wait: _Wait, vehicle: VehicleView) -> dict[Condition, str]:
+        wait.back_ns = now_ns if wait.back_ns is None else wait.back_ns
+        settled = now_ns - wait.back_ns >= wait.lasts_s * NS_PER_S
+        taken = settled and vehicle.foreign and not vehicle.piloted and not wait.foreign
+        doubt = "it is in a mode that is not ours" if taken else "" if settled else self._impatience(now_ns, wait)
         if doubt:
             return {Condition.BACK_IN_DOUBT: doubt}
-        return {Condition.TELEMETRY_BACK: f"{sound_s:g} s"} if self._long else {}
+        if settled:
+            self._wait = None
+            return {}
+        return {Condition.TELEMETRY_BACK: f"{wait.lasts_s:g} s"}
 
-    def _doubt(self, now_ns: int, settled: bool, vehicle: VehicleView, limits: WatchdogLimits) -> str:
-        """Return why it does not go on by itself, or ""; who flies it shows in a report that comes once a second."""
-        within_ns = limits.returns_within_s * NS_PER_S
-        self._times_ns = [time_ns for time_ns in self._times_ns if now_ns - time_ns < within_ns]
-        if len(self._times_ns) > limits.returns_most and not settled:
-            return f"it was silent {len(self._times_ns)} times within {limits.returns_within_s:g} s"
-        return "it is in a mode that is not ours" if settled and vehicle.foreign else ""
+    def _impatience(self, now_ns: int, wait: _Wait) -> str:
+        """Return why it no longer waits for lasting telemetry, or ""."""
+        self._times_ns = [time_ns for time_ns in self._times_ns if now_ns - time_ns < _TIMES_WITHIN_S * NS_PER_S]
+        if len(self._times_ns) > _TIMES:
+            return f"it was silent {len(self._times_ns)} times within {_TIMES_WITHIN_S:g} s"
+        patchy = now_ns - wait.since_ns > _LASTS_WITHIN_S * NS_PER_S
+        return f"with gaps for {_LASTS_WITHIN_S:g} s" if patchy else ""

@@ -51,13 +51,10 @@ REFUSABLE = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop
 class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
-    resume_within_s: a longer silence of the supervisor, or of a vehicle with wrong values, needs a RESUME.
-    sound_after_s: after a longer one of a sound vehicle's radio it goes on once its telemetry has lasted for stands_s,
-    in which it brakes if it has heard nothing either; after one of resume_within_s for sound_s, and returns_most times
-    within returns_within_s. tracker_resume_within_s: a longer silence of the tracker, or of any part between it and
-    here, needs a RESUME; likewise
-    gap_s: a pause of our own loop. unresumed_land_s: it lands if no RESUME comes for so long (after a pause of the
-    tracker: land_after_s). cut_s: it may fly on after an order to cut its motors. brake_s: hover before landing
+    resume_within_s: a longer silence of the supervisor, or of a vehicle with wrong values, needs a RESUME; likewise
+    tracker_resume_within_s: of the tracker, or of any part between it and here; gap_s: a pause of our own loop.
+    unresumed_land_s: it lands if no RESUME comes for so long (after a pause of the tracker: land_after_s).
+    cut_s: it may fly on after an order to cut its motors. brake_s: hover before landing
     when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise explain while
     at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes (flown by others, lands), for
     fast_resume_s it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands:
@@ -81,11 +78,6 @@ class WatchdogLimits:
     battery_min: float = 0.15
     battery_hold_s: float = 3.0
     resume_within_s: float = 1.0
-    sound_after_s: float = 0.5
-    stands_s: float = 0.8
-    sound_s: float = 1.5
-    returns_most: int = 3
-    returns_within_s: float = 60.0
     tracker_resume_within_s: float = 0.5
     unresumed_land_s: float = 30.0
     gap_s: float = 0.5

@@ -30,8 +30,8 @@ EVIDENCE: dict[Condition, str] = {
     "counts in full",
     Condition.TELEMETRY_BACK: "telemetry has lasted for less than 1.5 s without a pause of 0.3 s, after a "
     "`telemetry_silent` of 1.0 s since the last order to go on; or for less than 0.8 s, after one of 0.5 s",
-    Condition.BACK_IN_DOUBT: "likewise, after the fourth one of 1.0 s within 60 s, no such order since; or after those "
-    "1.5 s in a mode that is not ours (MAVLink)",
+    Condition.BACK_IN_DOUBT: "likewise, after the fourth one of 1.0 s within 60 s, or for 10 s in all, no such order "
+    "since; or in a mode that others chose meanwhile (MAVLink)",
     Condition.STATE_UNKNOWN: "its state is UNKNOWN or LOST",
     Condition.NOT_STANDING: "its state is neither LANDED nor EMERGENCY",
     Condition.BATTERY_LOW: "battery below `limits.battery_min`",

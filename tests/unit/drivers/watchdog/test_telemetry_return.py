@@ -70,6 +70,56 @@ def test_telemetry_for_a_part_of_the_time_lands_it(new_bench, heard_s, gone_s):
     assert Action.FLY not in late
 
 
+def test_gaps_that_go_on_after_a_long_silence_end_the_wait_and_then_the_flight(new_bench):
+    bench, actions = new_bench().fly(), []
+    silent(bench, 1.2)
+    for _ in range(8):
+        actions += bench.run(1.3) + silent(bench, 0.1)
+    assert set(actions) == {Action.HOVER}
+    assert bench.watchdog.failsafe == Condition.BACK_IN_DOUBT
+    assert bench.watchdog.reason == "its telemetry is back, but with gaps for 10 s; RESUME is needed"
+    assert bench.run(31)[-1] is Action.LAND, "nobody hovers for ever"
+
+
+def test_after_a_shorter_silence_gaps_only_brake_it(new_bench):
+    bench, actions = new_bench().fly(), []
+    silent(bench, 0.6)
+    for _ in range(40):
+        actions += bench.run(0.7) + silent(bench, 0.1)
+    assert bench.watchdog.mode is DriverMode.TRACK
+    assert actions[40:].count(Action.FLY) > 0.8 * len(actions[40:])
+
+
+def test_gaps_are_not_counted_as_long_silences(new_bench):
+    bench = new_bench().fly()
+    silent(bench, 2.0)
+    for _ in range(3):
+        bench.run(1.0)
+        silent(bench, 0.1)
+    assert bench.run(1.7)[-1] is Action.FLY
+
+
+def test_an_order_to_go_on_ends_what_a_later_wrong_value_could_add_to(new_bench):
+    bench = new_bench().fly()
+    silent(bench, 2.0)
+    bench.run(0.2)
+    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    assert bench.run(2)[-1] is Action.FLY
+    bench.unsound = "its attitude jumped"
+    assert bench.step().action is Action.HOVER
+    bench.unsound = ""
+    assert bench.step().action is Action.FLY
+
+
+def test_a_pilot_who_flew_it_before_the_silence_keeps_it(new_bench):
+    bench = new_bench().fly()
+    bench.foreign = bench.piloted = True
+    bench.run(3)
+    silent(bench, 1.2)
+    bench.run(40)
+    assert bench.watchdog.mode is DriverMode.TRACK, "neither RESUME nor a landing takes it from the pilot"
+
+
 def test_the_fourth_time_in_a_minute_it_waits_for_an_order_which_permits_three_more(new_bench):
     bench = new_bench().fly()
     for _ in range(2):

@@ -67,7 +67,7 @@ class VehicleHost:
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m, limits.max_speed_m_s)
         self._unlocalised, self._touch_down, self._coming_down = UnlocalisedTime(), TouchDown(), ComingDown()
-        self._fence = FenceWatch(limits.fence_m)
+        self._fence = FenceWatch(limits.fence_m, limits.max_speed_m_s, limits.max_climb_m_s)
 
     def call_on_commands(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a command arrives."""

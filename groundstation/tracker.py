@@ -63,7 +63,7 @@ class Tracker:
         self.mounts = MountWatch(parameters.estimator)
         self._joinings = Joinings()
         self._localisation = Localisation(parameters.safety)
-        self._hovering = Hovering(level=parameters.control.fed)
+        self._hovering = Hovering(parameters.control.fed, parameters.safety)
         self._shafts = Shafts(parameters.estimator, parameters.safety)
         self._topology = Topology(())
         self._plans = PlanWatch(parameters.control.max_plan_age_s)

@@ -14,6 +14,7 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world
 from groundstation.planning.parameters import MotionLimits
 from groundstation.time_units import NS_PER_MS
+from groundstation.vectors import Bounds
 
 _HOVERS = frozenset({"HOVER", "HOLD"})  # a driver's modes in which the drone hovers for an order
 # A drone at its maximum speed comes to rest within a second, and then reports that too.
@@ -42,12 +43,16 @@ class _Stay:
     returning: bool = False
     levelling: bool = False
 
-    def back(self, now_ns: int, x: float, y: float, z: float) -> Vector3:
-        """Return the velocity to the place [m/s; world], zero near it and until the robot has come to rest."""
+    def back(self, now_ns: int, here: Vector3, room: Bounds | None) -> Vector3:
+        """Return the velocity to the place [m/s; world], zero near it and until the robot has come to rest.
+
+        room: where a place may be [m; world].
+        """
+        x, y, z = here
         if now_ns - self.since_ns < _SETTLES_NS:
             return _STILL
         if self.place is None or math.dist(self.place[:2], (x, y)) > _LEASH_M or abs(self.place[2] - z) > _LEASH_UP_M:
-            self.place, self.returning, self.levelling = (x, y, z), False, False
+            self.place, self.returning, self.levelling = _within(room, here), False, False
         dx, dy, dz = self.place[0] - x, self.place[1] - y, self.place[2] - z
         off_m = math.hypot(dx, dy)
         self.returning = off_m > (_ARRIVES_M if self.returning else _LEAVES_M)
@@ -61,11 +66,12 @@ class Hovering:
     """Use: `take` every status; at each tick pass all setpoints through `held`, limit them `within`, then `sent`.
 
     A robot that may stray, or waits after a pause of the tracker, hovers by itself, and so does one of doubtful place.
-    level: robots that hold their height by our estimate, and of a way back obey the horizontal part only.
+    level: robots that hold their height by our estimate, and of a way back obey the horizontal part only. safety: of
+    the fence, in which places to hold are chosen; None: there is none.
     """
 
-    def __init__(self, level: Collection[str] = ()) -> None:
-        self._level = frozenset(level)
+    def __init__(self, level: Collection[str] = (), safety: SafetyParameters | None = None) -> None:
+        self._level, self._room = frozenset(level), None if safety is None else _room(safety)
         self._stays: dict[str, _Stay] = {}
 
     def take(self, status: VehicleStatus, now_ns: int) -> None:
@@ -109,9 +115,25 @@ class Hovering:
         velocity = _STILL
         if name in belief.layout and _is_sure(name, seen_s):
             x, y, z, yaw = belief.mean_of(name)[:4].tolist()
-            forward, left, up = stabilized_from_world(np.array(stay.back(now_ns, x, y, z)), yaw).tolist()
+            back = stay.back(now_ns, (x, y, z), self._room)
+            forward, left, up = stabilized_from_world(np.array(back), yaw).tolist()
             velocity = (forward, left, 0.0 if name in self._level else up)
         return replace(setpoint, velocity_m_s=velocity, yaw_rate_rad_s=0.0)
+
+
+def _room(safety: SafetyParameters) -> Bounds:
+    """Return where places to hold may be [m; world]: in the fence, by the limiter's margin; the bottom counts not."""
+    (west, east), (south, north), (_, top) = safety.fence
+    kept_m = safety.margin_m
+    return (west + kept_m, east - kept_m), (south + kept_m, north - kept_m), (-math.inf, top - kept_m)
+
+
+def _within(room: Bounds | None, place: Vector3) -> Vector3:
+    """Return the nearest place in a room."""
+    if room is None:
+        return place
+    x, y, z = (max(low, min(high, at)) for (low, high), at in zip(room, place, strict=True))
+    return x, y, z
 
 
 def _sent(limited: Limited, sure: bool) -> Limited:

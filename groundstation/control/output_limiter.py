@@ -1,4 +1,5 @@
-"""The last step before a setpoint is sent: shrinks a velocity or hovers; adds velocity only against a drift.
+"""The last step before a setpoint is sent: shrinks a velocity or hovers; adds velocity only against a drift, or to lead
+a robot back into the fence.
 
 Why its half-spaces keep fence and separation for any wanted velocity: docs/explanation/safety.md#why-it-holds.
 """
@@ -11,12 +12,12 @@ from types import MappingProxyType
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.control.half_spaces import project
+from groundstation.control.half_spaces import TOLERANCE_M_S, project
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
 from groundstation.control.shafts import Shaft
 from groundstation.control.view import is_placed
-from groundstation.control.walls import Wall, held_off, place_of, turning, walls_around
+from groundstation.control.walls import Wall, held_off, led_back, place_of, turning, walls_around
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.parameters import MotionLimits
@@ -59,7 +60,8 @@ def limit_setpoint(
 
     velocities: measured ones [m/s; world], by robot, where known: braking starts later than without. drifts: motion
     beyond the commands [m/s; world], by robot: a robot in it is assumed to drift by up to `drift_m_s` more in any
-    direction, and may be moved away from a wall to counter the drift; None: nothing is added. shafts: of other robots;
+    direction, and may be moved away from a wall to counter the drift, and back into the fence; None: nothing is added.
+    shafts: of other robots;
     they are kept out of at any height. Each of two robots may use half of the closing speed between them, so that every
     robot is limited on its own.
     """
@@ -74,11 +76,27 @@ def limit_setpoint(
     walls = walls if drift is None else [held_off(wall, drift.tolist(), parameters) for wall in walls]
     if rate:
         walls += [turning(wall, rate, parameters.reaction_s) for wall in walls]
-    velocity, met = _nearest(velocity, walls, parameters.limits_of(robot))
+    limits = parameters.limits_of(robot)
+    velocity, met = _nearest(velocity, walls, limits) if drift is None else _returning(velocity, walls, limits)
     names += [walls[i].name for i in met]
     vx, vy, vz = stabilized_from_world(velocity, yaw).tolist()
     limited = Setpoint((vx, vy, vz), float(rate), setpoint.phase, setpoint.blocked)
     return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
+
+
+def _returning(wanted: Array, walls: list[Wall], limits: MotionLimits) -> tuple[Array, list[int]]:
+    """Return the nearest velocity that also leads back who is beyond the fence, unless that costs what walls demand."""
+    velocity, met = _nearest(wanted, walls, limits)
+    if not any(wall.back for wall in walls):
+        return velocity, met
+    back, met_back = _nearest(wanted, [led_back(wall) for wall in walls], limits)
+    costs = _excess(back, walls) > max(0.0, _excess(velocity, walls)) + TOLERANCE_M_S
+    return (velocity, met) if costs else (back, met_back)
+
+
+def _excess(velocity: Array, walls: list[Wall]) -> float:
+    x, y, z = velocity.tolist()
+    return max(dot(wall.normal, (x, y, z)) - wall.most for wall in walls)
 
 
 def _nearest(wanted: Array, walls: list[Wall], limits: MotionLimits) -> tuple[Array, list[int]]:

@@ -81,7 +81,8 @@ class SafetyParameters:
 
     fence: intervals of x, y, z [m; world]; reaction_s: lag with which a vehicle follows a velocity; margin_m: distance
     kept from fence and other robots beyond `sigmas` standard deviations of the belief. drift_m_s: motion beyond the
-    commands that may not have been noticed yet; most_drift_m_s: largest drift that is countered.
+    commands that may not have been noticed yet; most_drift_m_s: largest drift that is countered; return_m_s: a robot
+    beyond the fence is led back at so much more.
     max_known_velocity_error_m_s, max_velocity_error_m_s: largest mean and rms error of the odometry, by the belief,
     with which a robot may fly unseen; robots that fly on our estimate are exempt. pads: where robots take off
     [x, y; world]. obstacles: what robots keep their centres obstacle_distance_m away from.
@@ -98,6 +99,7 @@ class SafetyParameters:
     sigmas: float = 2.0
     drift_m_s: float = 0.05
     most_drift_m_s: float = 0.2
+    return_m_s: float = 0.15
     limits: Mapping[str, MotionLimits] = field(default_factory=dict)
     pads: Mapping[str, Vector2] = field(default_factory=dict)
     obstacles: tuple[Box, ...] = ()

@@ -16,6 +16,9 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Box
 from groundstation.vectors import Vector3, difference, dot
 
+# Beyond the fence a robot is led back at 1.5 times its distance a second, up to `return_m_s`. With what counters drifts
+# that is 0.1 m/s or more until 0.05 m beyond, as its driver expects of one on its way back (drivers/fence.py).
+_RETURN_GAIN_PER_S = 1.5
 # A shorter way has no direction.
 _NOWHERE_M = 1e-6
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -24,11 +27,15 @@ _INWARDS = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
 
 
 class Wall(NamedTuple):
-    """Velocity along the unit vector `normal` must not exceed `most` [m/s; world]."""
+    """Velocity along the unit vector `normal` must not exceed `most` [m/s; world].
+
+    back: by how much less it should be of a robot that is beyond the wall, where all other walls allow that.
+    """
 
     name: str
     normal: Vector3
     most: float
+    back: float = 0.0
 
 
 def walls_around(
@@ -48,7 +55,12 @@ def walls_around(
 def held_off(wall: Wall, drift: Vector3, parameters: SafetyParameters) -> Wall:
     """Return the wall for a robot that drifts: nearer by the possible drift, never demanding more than that."""
     allowed = min(parameters.drift_m_s + max(0.0, dot(drift, wall.normal)), parameters.most_drift_m_s)
-    return Wall(wall.name, wall.normal, wall.most - allowed)
+    return wall._replace(most=wall.most - allowed)
+
+
+def led_back(wall: Wall) -> Wall:
+    """Return the wall that leads a robot beyond it back."""
+    return wall._replace(most=wall.most - wall.back)
 
 
 def turning(wall: Wall, rate: float, reaction_s: float) -> Wall:
@@ -61,7 +73,7 @@ def turning(wall: Wall, rate: float, reaction_s: float) -> Wall:
     turn = reaction_s * rate
     x, y = x + turn * y, y - turn * x
     size = math.hypot(x, y, z)
-    return Wall(wall.name, (x / size, y / size, z / size), wall.most / size)
+    return Wall(wall.name, (x / size, y / size, z / size), wall.most / size, wall.back / size)
 
 
 def place_of(robot: str, belief: JointBelief) -> Vector3:
@@ -98,12 +110,21 @@ def _braking(
 
 
 def _fence(robot: str, belief: JointBelief, parameters: SafetyParameters, rest: Vector3, time: float) -> list[Wall]:
-    walls = []
-    for (low, high), normal, at, variance in zip(parameters.fence, _AXES, rest, _variances(robot, belief), strict=True):
-        keep = parameters.margin_m + parameters.sigmas * math.sqrt(variance)
-        walls.append(Wall("fence", normal, max(0.0, high - keep - at) / time))
-        walls.append(Wall("fence", (-normal[0], -normal[1], -normal[2]), max(0.0, at - low - keep) / time))
+    """Return the fence's walls; the bottom leads nobody back: flights begin and end below it."""
+    walls, place, variances = [], place_of(robot, belief), _variances(robot, belief)
+    for axis, (low, high) in enumerate(parameters.fence):
+        normal, at, here = _AXES[axis], rest[axis], place[axis]
+        keep = parameters.margin_m + parameters.sigmas * math.sqrt(variances[axis])
+        beneath_m = 0.0 if axis == 2 else low - here
+        inwards = (-normal[0], -normal[1], -normal[2])
+        walls.append(Wall("fence", normal, max(0.0, high - keep - at) / time, _back(here - high, parameters)))
+        walls.append(Wall("fence", inwards, max(0.0, at - low - keep) / time, _back(beneath_m, parameters)))
     return walls
+
+
+def _back(beyond_m: float, parameters: SafetyParameters) -> float:
+    """Return the speed at which to lead a robot back that is so far beyond the fence."""
+    return min(parameters.return_m_s, _RETURN_GAIN_PER_S * max(0.0, beyond_m))
 
 
 def _obstacles(robot: str, belief: JointBelief, parameters: SafetyParameters, rest: Vector3, time: float) -> list[Wall]:

@@ -52,27 +52,36 @@ def judge(states: TeamStates, told: Told, robot: int) -> Counter[str]:
     """Assert the promises for one robot's setpoints; returns the number of states by outcome.
 
     "hovers": unfit to fly; "open": no wall limits the wish; "bent": a wall limits the wish; "held off": a wall requires
-    motion against a drift; "squeezed": the walls require more than a vehicle can do.
+    motion against a drift, or back into the fence; "kept out": others do not let it come back; "squeezed": the walls
+    require more than a vehicle can do.
     """
     velocity, rate = told.velocities[:, robot], told.yaw_rates[:, robot]
     unfit = states.unfit(robot)
     _none(unfit & ((velocity != 0.0).any(axis=1) | (rate != 0.0)), "who is unfit hovers")
     _none(_too_fast(velocity) | (np.abs(rate) > LIMITS.max_yaw_rate_rad_s), "limits are kept")
     normals, most = promised(states, robot, rate)
+    _, without = promised(states, robot, rate, returns=False)
     excess = _excess(normals, most, velocity)
-    nearer = (excess - np.maximum(-most, 0.0)).max(axis=1) > _TOLERANCE_M_S
+    demanded = _excess(normals, without, velocity)
+    nearer = (demanded - np.maximum(-without, 0.0)).max(axis=1) > _TOLERANCE_M_S
     _none(~unfit & nearer, "nobody comes nearer than a wall lets it")
     unmet = ~unfit & (excess.max(axis=1) > _TOLERANCE_M_S)
     if unmet.any():
         which = np.flatnonzero(unmet)
         _none(_at(which, anything_allowed(normals[which], most[which]), unmet), "what holds off every drift is found")
+    squeezed = ~unfit & (demanded.max(axis=1) > _TOLERANCE_M_S)
+    which = np.flatnonzero(squeezed & (without != most).any(axis=1))
+    if which.size:
+        allowed = anything_allowed(normals[which], without[which])
+        _none(_at(which, allowed, squeezed), "no return costs what holds off a drift")
     wish = _clipped(states.wishes[:, robot])
     free = ~unfit & (_excess(normals, most, wish).max(axis=1) < -_TOLERANCE_M_S)
     _none(free & (np.abs(velocity - wish).max(axis=1) > 1e-9), "an open way changes nothing")
     met = ~unfit & ~unmet & ~free
     _none(met & _could_be_nearer(velocity, wish, normals, most), "a step nearer to the wish is allowed")
     pushed = met & (most.min(axis=1) < 0.0)
-    ends = {"hovers": unfit, "open": free, "bent": met & ~pushed, "held off": pushed, "squeezed": unmet}
+    ends = {"hovers": unfit, "open": free, "bent": met & ~pushed, "held off": pushed, "squeezed": squeezed}
+    ends["kept out"] = unmet & ~squeezed
     return Counter({end: int(where.sum()) for end, where in ends.items()})
 
 

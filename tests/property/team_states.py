@@ -150,9 +150,10 @@ def _wishes(rng: np.random.Generator, places: Array) -> Array:
     return np.where(rng.random((count, robots, 1)) < 0.5, at_another, anywhere)
 
 
-def promised(states: TeamStates, robot: int, yaw_rates: Array) -> tuple[Array, Array]:
+def promised(states: TeamStates, robot: int, yaw_rates: Array, returns: bool = True) -> tuple[Array, Array]:
     """Return the half-spaces of the safety page (why it holds): normals [n, m, 3], the limit along each [n, m; m/s].
 
+    returns: with those that lead a robot back that is beyond the fence.
     They leave room for the drift. They hold for the velocity as sent and as the vehicle carries it along in a turn:
     v + T yaw_rate (z x v).
     """
@@ -163,6 +164,8 @@ def promised(states: TeamStates, robot: int, yaw_rates: Array) -> tuple[Array, A
     known = np.maximum(np.einsum("nmi,ni->nm", normals, states.drifts[:, robot]), 0.0)
     room = np.minimum(SAFETY.drift_m_s + known, SAFETY.most_drift_m_s)
     most = np.maximum(barriers, 0.0) / times - np.nan_to_num(room)
+    if returns:
+        most[:, :6] -= np.where(np.isnan(states.drifts[:, robot, :1]), 0.0, _back(states, robot))
     x, y, z = np.moveaxis(normals, 2, 0)
     turn = SAFETY.reaction_s * yaw_rates[:, None]
     turned = np.stack((x + turn * y, y - turn * x, z), axis=2)
@@ -175,6 +178,14 @@ def _fence(states: TeamStates, robot: int) -> tuple[Array, Array, Array]:
     barriers = np.concatenate((_FENCE[:, 1] - kept - rest, rest - _FENCE[:, 0] - kept), axis=1)
     normals = np.broadcast_to(np.concatenate((np.eye(3), -np.eye(3))), (len(rest), 6, 3))
     return normals, barriers, np.broadcast_to(time_s[:, None], barriers.shape)
+
+
+def _back(states: TeamStates, robot: int) -> Array:
+    """Return how fast a robot beyond each of the fence's sides is led back, in the order of _fence [n, 6; m/s]."""
+    place = states.poses[:, robot, :3]
+    beyond = np.concatenate((place - _FENCE[:, 1], _FENCE[:, 0] - place), axis=1)
+    beyond[:, 5] = 0.0  # the bottom leads nobody back
+    return np.clip(1.5 * beyond, 0.0, SAFETY.return_m_s)
 
 
 def _obstacle(states: TeamStates, robot: int, box: Box) -> tuple[Array, Array, Array]:

@@ -74,6 +74,16 @@ def test_one_on_its_way_back_is_left_alone_unless_others_fly_it(place, back):
         assert words(place, velocity, returning_counts=True)
 
 
+@pytest.mark.parametrize(
+    ("place", "back", "enough_m_s"), [((3.4, 0.0, 1.2), (-1, 0, 0), 0.04), ((0.0, 0.0, 2.9), (0, 0, -1), 0.03)]
+)
+def test_one_that_may_fly_only_slowly_is_on_its_way_back_at_half_of_that(place, back, enough_m_s):
+    watch = FenceWatch(FENCE, max_speed_m_s=0.08, max_climb_m_s=0.06)
+    for speed_m_s, told in ((enough_m_s - 0.005, True), (enough_m_s + 0.005, False)):
+        watch.hear(0, estimate(place, tuple(speed_m_s * part for part in back)))
+        assert bool(watch.outside(0, False)) is told
+
+
 def test_one_that_comes_back_through_one_side_and_not_through_another_is_told():
     place, back = (3.9, 0.0, 2.8), (-0.3, 0.0, 0.0)
     assert words(place, back) == "it is 0.3 m above the fence"

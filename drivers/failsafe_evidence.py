@@ -200,6 +200,7 @@ class Evidence:
         self.holding: dict[Condition, str] = {}
         self.charged_s: dict[Condition, float] = {}
         self._pardoned_s: dict[Condition, float] = {}
+        self._anew_s: dict[Condition, float] = {}
         self._last_ns: int | None = None
         self._waits: dict[Condition, int] = {}
         self._mode: DriverMode | None = None
@@ -226,11 +227,9 @@ class Evidence:
         waits = {condition: at.since_s(since_ns) for condition, since_ns in self._waits.items()}
         for condition, lasted_s in (timed(at, limits) | waits).items():
             self.holding[condition], self.charged_s[condition] = _why(condition, at), lasted_s
-        self._pardoned_s = {
-            condition: min(pardoned_s, self.charged_s[condition])
-            for condition, pardoned_s in self._pardoned_s.items()
-            if condition in self.charged_s
-        }
+        for since_s in (self._pardoned_s, self._anew_s):
+            for condition in since_s:
+                since_s[condition] = min(since_s[condition], self.charged_s.get(condition, 0.0))
         self._observe_silence(at, limits)
 
     def _observe_return(self, at: Situation, limits: WatchdogLimits) -> None:
@@ -254,11 +253,10 @@ class Evidence:
         self.holding |= self._return.step(at.now_ns, charged_s, at.mode is DriverMode.TRACK, at.vehicle, limits)
 
     def against_s(self, row: Failsafe) -> float | None:
-        """Return how long a row's condition has lasted [s]: since the last order that ends the row, if one does."""
-        lasted_s = self.lasted_s(row.condition)
-        if lasted_s is None or row.latch is not Latch.RESUME:
-            return lasted_s
-        return lasted_s - self._pardoned_s.get(row.condition, 0.0)
+        """Return how long a row's condition has lasted [s]: since the last order that ends it, or begins it anew."""
+        lasted_s, ends = self.lasted_s(row.condition), row.latch is Latch.RESUME
+        since_s = self._pardoned_s if ends else self._anew_s if row.anew else {}
+        return None if lasted_s is None else lasted_s - since_s.get(row.condition, 0.0)
 
     def lasted_s(self, condition: Condition) -> float | None:
         """Return for how long a condition has lasted [s], or None if it does not hold."""
@@ -296,7 +294,7 @@ class Evidence:
             Outlook(row, max(0.0, row.after_s - lasted_s))
             for row in self._table
             if row.reaction is reaction and mode in row.modes
-            and _is_told(row, lasted_s := self.lasted_s(row.condition) or 0.0)
+            and _is_told(row, lasted_s := self.against_s(row) or 0.0)
         ]  # fmt: skip
         return min(waits, key=lambda outlook: outlook.in_s, default=None)
 
@@ -304,9 +302,15 @@ class Evidence:
         """Begin anew with all conditions, for a take-off."""
         self.charged_s.clear()
         self._pardoned_s.clear()
+        self._anew_s.clear()
         self._return.forget()
 
-    def pardon(self) -> None:
-        """Begin anew for the rows that an order to go on ends; their conditions go on counting for all others."""
+    def pardon(self, hovers_for: str = "") -> None:
+        """Begin anew for the rows that an order to go on ends; their conditions go on counting for all others.
+
+        hovers_for: a condition, or "". Rows that land for it may begin anew, too; once, until it has worn off.
+        """
         self._pardoned_s = dict(self.charged_s)
+        for condition in self.charged_s.keys() & {hovers_for}:
+            self._anew_s[condition] = self._anew_s.get(condition) or self.charged_s[condition]
         self._return.forget()

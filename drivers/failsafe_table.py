@@ -96,7 +96,8 @@ class Failsafe:
     after_s: how long the condition must have lasted (its debounce). forgets: seconds of decay per second without it
     (its hysteresis); None: all at once. modes: in which it counts. text: for the operator; `{why}` is filled in from
     the evidence. brake: hover first, because it is unknown what the vehicle was doing. limit: the setting that gives
-    the time, of which after_s leaves out what has passed before the condition is noticed.
+    the time, of which after_s leaves out what has passed before the condition is noticed. anew: once, TRACK or
+    RESUME in a hover for this condition begin its time anew.
     """
 
     condition: Condition
@@ -108,6 +109,7 @@ class Failsafe:
     latch: Latch = Latch.TAKEOFF
     modes: frozenset[DriverMode] = ALOFT
     brake: bool = False
+    anew: bool = False
 
     def applies(self, mode: DriverMode, lasted_s: float | None) -> bool:
         """Return whether it acts in a mode; lasted_s: how long its condition has lasted (None: it does not hold)."""
@@ -193,8 +195,9 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  modes=FREE),
         # Hovering and tracking drones are moved apart: this is for when that fails.
         Failsafe(Condition.CROWDED, land, "{why}", limits.crowded_land_s, "", SLOWLY, modes=FREE),
-        # Nobody stays outside, be it in a hover that nothing ends; one that is on its way back is not counted.
-        Failsafe(Condition.OUTSIDE, land, "{why}", limits.land_after_s, patience, SLOWLY),
+        # Nobody stays outside, be it in a hover that nothing ends; one that is on its way back is not counted, and one
+        # told to go on has the time to begin.
+        Failsafe(Condition.OUTSIDE, land, "{why}", limits.land_after_s, patience, SLOWLY, anew=True),
         # Others obey no limiter of ours; no order but LAND stops what they fly.
         Failsafe(Condition.FLOWN_OUTSIDE, land, "{why}, not by our orders", limits.flown_outside_s, "", SLOWLY),
         # A pilot has landed it, or it was pressed down: its controllers wind up until it notices that it has landed.

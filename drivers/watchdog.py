@@ -184,7 +184,7 @@ class Watchdog:
                 return "the tracker was restarted: RESUME is needed"
             if not self.gate.adopt(now_ns):
                 return "the restarted tracker has no converged belief of this drone yet"
-        self.evidence.pardon()
+        self.evidence.pardon(self.failsafe)
         return self._enter(now_ns, DriverMode.TRACK, f"tracking for {command.issuer}")
 
     def _enter(self, now_ns: int, mode: DriverMode, reason: str, row: Failsafe | None = None) -> str:

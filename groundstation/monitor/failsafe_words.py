@@ -6,7 +6,7 @@ from groundstation.bus.messages import AIRBORNE, NOT_DOWN, VehicleStatus
 
 # As drivers end the reason for a hover that only an order ends.
 _NEEDED = "; RESUME is needed"
-_UNCUT, _STANDS = "cut_ignored", "stands_running"
+_UNCUT, _STANDS, _OUTSIDE = "cut_ignored", "stands_running", "outside"
 _RESUME = "To do: press RESUME, or HOLD to keep it there"
 
 _STAY_AWAY = "To do: stay away until it is down, it is told to land; CUT MOTORS tries to stop its motors again."
@@ -42,6 +42,8 @@ def failsafe_words(status: VehicleStatus) -> FailsafeWords | None:
         return FailsafeWords("waits", text, True, f"{_RESUME}; otherwise it lands by itself.")
     if soon:
         advice = "Nothing to do: it lands by itself unless this ends. HOLD does not stop it."
+        if status.failsafe == _OUTSIDE:
+            advice = "To do: press RESUME: the tracker leads it back; otherwise it lands by itself."
         return FailsafeWords("lands", f"{soon}: {why}", True, advice)
     if status.braked:
         return FailsafeWords("braked", status.detail, False, "Nothing to do: it follows its plan again when this ends.")

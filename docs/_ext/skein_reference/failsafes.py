@@ -60,7 +60,8 @@ EVIDENCE: dict[Condition, str] = {
     "other (0.2 m) the later one by name",
     Condition.OUTSIDE: "its estimated place is outside `room.fence` in the plane, or above it, by more than 0.1 m and "
     "two standard deviations, until it is back within 0.05 m; not while it comes back at 0.1 m/s or half of its limit, "
-    "nor while a pilot's sticks may move it, nor by an estimate that sightings contradict or that is older than 0.3 s",
+    "nor while a pilot's sticks may move it, nor by an estimate that sightings contradict or that is older than 0.3 s. "
+    "RESUME or TRACK in the hover give it the time of the landing anew, once until it has worn off",
     Condition.FLOWN_OUTSIDE: "likewise, coming back or not, in a mode that is not ours (MAVLink)",
     Condition.ON_FLOOR: "since its take-off it was higher, and now its estimated height, known to 0.2 m within two "
     "standard deviations, is 0.1 m or less",

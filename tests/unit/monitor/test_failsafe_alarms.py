@@ -25,6 +25,20 @@ def test_a_hover_that_only_an_order_ends_asks_for_one(world: World, lands_in_s: 
     assert alarm.advice == "To do: press RESUME, or HOLD to keep it there; otherwise it lands by itself."
 
 
+def test_a_hover_outside_the_fence_asks_for_the_order_that_leads_it_back(world: World) -> None:
+    why = "it is 0.3 m outside the fence"
+    world.vehicle("drone_1", "HOVER", failsafe="outside", detail=why, lands_in_s=1.9)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert (alarm.text, alarm.asks, alarm.grave) == (f"drone_1 starts to land in 2 s: {why}", True, True)
+    assert alarm.advice == "To do: press RESUME: the tracker leads it back; otherwise it lands by itself."
+    world.vehicle("drone_1", "TRACK", detail=why, lands_in_s=2.4)
+    world.text()
+    assert [(one.text, one.asks) for one in alarms_of(world.state, NOW)] == [
+        (f"drone_1 starts to land in 2 s: {why}", False)
+    ]
+
+
 def test_a_landing_that_no_order_stops_asks_for_none(world: World) -> None:
     why = "no telemetry from the vehicle"
     world.vehicle("drone_1", "HOVER", failsafe="telemetry_silent", detail=why, lands_in_s=1.2)

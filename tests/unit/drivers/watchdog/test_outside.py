@@ -42,15 +42,57 @@ def test_a_tracker_may_bring_it_back_once_the_operator_says_so(new_bench):
     assert set(bench.run(10.0)) == {Action.FLY}
 
 
-@pytest.mark.parametrize("verb", [Verb.HOLD, Verb.RESUME])
-def test_no_order_but_those_of_landing_keeps_it_outside(new_bench, verb):
+def test_hold_does_not_keep_it_outside(new_bench):
     bench = new_bench().fly()
     bench.outside = OUT
     for _ in range(4):
         bench.run(0.7)
         bench.see()
-        bench.order(verb)
+        bench.order(Verb.HOLD)
     assert bench.run(0.4)[-1] is Action.LAND
+
+
+@pytest.mark.parametrize("verb", [Verb.TRACK, Verb.RESUME])
+@pytest.mark.parametrize("waited_s", [1.2, 2.8])
+def test_an_order_to_go_on_gives_it_the_time_to_come_back(new_bench, verb, waited_s):
+    bench = new_bench().fly()
+    bench.outside = OUT
+    bench.run(waited_s)
+    bench.see()
+    assert bench.order(verb).stage is AckStage.ACCEPTED
+    assert set(bench.run(0.9)) == {Action.FLY} and bench.watchdog.lands_in_s == pytest.approx(2.1, abs=0.1)
+    assert set(bench.run(2.0)[5:]) == {Action.HOVER}
+    assert bench.run(0.3)[-1] is Action.LAND
+
+
+def test_one_told_to_go_on_that_comes_back_late_flies_on(new_bench):
+    bench = new_bench().fly()
+    bench.outside = OUT
+    bench.run(2.8)
+    bench.see()
+    bench.order(Verb.RESUME)
+    assert set(bench.run(0.8)) == {Action.FLY}
+    bench.outside = ""
+    assert set(bench.run(30.0)) == {Action.FLY}
+
+
+def test_orders_to_go_on_that_are_repeated_keep_it_outside_no_longer_than_one(new_bench):
+    bench = new_bench().fly()
+    bench.outside = OUT
+    for _ in range(3):
+        bench.run(1.4)
+        bench.see()
+        bench.order(Verb.RESUME)
+    assert bench.run(0.5)[-1] is Action.LAND
+
+
+def test_an_order_to_go_on_gives_no_time_to_one_that_others_fly(new_bench):
+    bench = new_bench().fly()
+    bench.outside, bench.foreign = OUT, True
+    bench.run(0.3)
+    bench.see()
+    bench.order(Verb.RESUME)
+    assert bench.run(0.3)[-1] is Action.LAND
 
 
 @pytest.mark.parametrize("mode", ["hover", "hold", "track", "take-off"])

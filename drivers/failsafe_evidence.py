@@ -133,7 +133,7 @@ def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[
         holding[Condition.CROWDED] = vehicle.crowded
     # Where a pilot's sticks take it is theirs to judge.
     if vehicle.outside and not vehicle.piloted:
-        holding[Condition.FLOWN_OUTSIDE if vehicle.foreign else Condition.OUTSIDE] = vehicle.outside
+        holding[Condition.FLOWN_OUTSIDE if vehicle.flown_by_others else Condition.OUTSIDE] = vehicle.outside
     if vehicle.speed_m_s > limits.tolerated_speed_m_s:
         allowed = f"{limits.max_speed_m_s:.1f} are allowed"
         condition = Condition.FLOWN_TOO_FAST if vehicle.foreign else Condition.TOO_FAST

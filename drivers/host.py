@@ -121,7 +121,7 @@ class VehicleHost:
         flies_away = away(seen_m_s, climb_m_s, self.watchdog.limits.tolerated_speed_m_s)
         return view._replace(
             height_m=self._coming_down.height_m, away=flies_away, touches_down=touches, on_floor=self._touch_down.low,
-            unseen_s=unseen_s, near=near, crowded=crowded, outside=self._fence.outside(now_ns, view.foreign),
+            unseen_s=unseen_s, near=near, crowded=crowded, outside=self._fence.outside(now_ns, view.flown_by_others),
         )  # fmt: skip
 
     def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:

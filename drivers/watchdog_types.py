@@ -133,7 +133,8 @@ class VehicleView(NamedTuple):
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
     down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     homeward: how it flies home or climbs by itself, and in which mode, or "".
-    foreign: others fly it, so its speed is judged, but not by our commands; piloted: a pilot's sticks may move it.
+    foreign: others fly it, so its speed is judged, but not by our commands; settles: not even that, for it ends a climb
+    by itself, or a pilot has just let go of it; piloted: a pilot's sticks may move it.
     rises: in HOVER it continues to its take-off height. fell: that it fell since its last start, or "". refuses: its
     answer to the order to take off, if that refused for good; unarmed: why it does not start its motors yet though it
     is to take off, in its own words, or "".
@@ -165,6 +166,7 @@ class VehicleView(NamedTuple):
     away: str = ""
     homeward: str = ""
     foreign: bool = False
+    settles: bool = False
     piloted: bool = False
     rises: bool = False
     fell: str = ""
@@ -175,6 +177,11 @@ class VehicleView(NamedTuple):
     def plausible(self) -> "VehicleView":
         """Return the view to act upon: a vehicle with implausible values counts as silent."""
         return self._replace(fresh=False) if self.unsound and self.fresh else self
+
+    @property
+    def flown_by_others(self) -> bool:
+        """Return whether others fly it, and have to keep our limits."""
+        return self.foreign and not self.settles
 
     @property
     def silence(self) -> str:

@@ -210,8 +210,8 @@ class MavlinkVehicle:
             self._flight.told(now_ns, known), fresh, battery, not_ready,
             unsound=unsound, velocity_m_s=velocity, lost_s=self.vision.lost_s(now_ns),
             unlocated=self.vision.missed, mute=mute, homeward=self._flight.homeward(now_ns, known), foreign=not heeded,
-            piloted=piloted, rises=self.orders.rises(now_ns), fell=FELL if self.orders.motors.fell else "",
-            unarmed=self._readiness.refusal(known),
+            settles=not limited, piloted=piloted, rises=self.orders.rises(now_ns),
+            fell=FELL if self.orders.motors.fell else "", unarmed=self._readiness.refusal(known),
         )  # fmt: skip
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:

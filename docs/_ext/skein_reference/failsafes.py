@@ -62,7 +62,8 @@ EVIDENCE: dict[Condition, str] = {
     "two standard deviations, until it is back within 0.05 m; not while it comes back at 0.1 m/s or half of its limit, "
     "nor while a pilot's sticks may move it, nor by an estimate that sightings contradict or that is older than 0.3 s. "
     "RESUME or TRACK in the hover give it the time of the landing anew, once until it has worn off",
-    Condition.FLOWN_OUTSIDE: "likewise, coming back or not, in a mode that is not ours (MAVLink)",
+    Condition.FLOWN_OUTSIDE: "likewise, coming back or not, in a mode that is not ours (MAVLink); not while it ends "
+    "its own climb, nor for 1.5 s after a pilot let go of it: that is `outside`",
     Condition.ON_FLOOR: "since its take-off it was higher, and now its estimated height, known to 0.2 m within two "
     "standard deviations, is 0.1 m or less",
     Condition.FLIES_AWAY: "by cameras it rises faster than 0.3 m/s, or is as fast as for `too_fast` and sinks by no "

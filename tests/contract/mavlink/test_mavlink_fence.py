@@ -78,6 +78,19 @@ def test_a_pilot_may_fly_it_out_while_a_transmitter_is_heard(fenced, transmitter
     assert (landed_m is None) is transmitter and beyond(rig) > 0.1
 
 
+def test_one_that_a_pilot_let_go_of_outside_may_settle_before_it_is_landed(fenced):
+    rig, mode = fenced, _STICKS[fenced.flavour]
+    rig.emulator.firmware.parameters.values["FS_THR_ENABLE"] = 3
+    rig.track_on()
+    rig.emulator.firmware.transmitter = True
+    rig.run(1.0)
+    rig.emulator.firmware.enter(mode)
+    assert flown(rig, mode, (0.4, 0.0, 0.0), 6.0) is None and beyond(rig) > 0.1
+    rig.emulator.firmware.enter(_HOLDS[rig.flavour])
+    assert flown(rig, _HOLDS[rig.flavour], (0.0, 0.0, 0.0), 1.4) is None
+    assert flown(rig, _HOLDS[rig.flavour], (0.0, 0.0, 0.0), 1.2) is not None
+
+
 def test_our_own_orders_that_lead_out_end_in_a_hover_and_a_landing(fenced):
     """As those of a tracker whose limiter fails."""
     rig = fenced

@@ -28,7 +28,7 @@ class Bench:
         self.seen = True
         self.near, self.crowded, self.away, self.clears = "", "", "", clears
         self.outside = ""
-        self.height, self.homeward, self.foreign = 1.2, "", False
+        self.height, self.homeward, self.foreign, self.settles = 1.2, "", False, False
         self.piloted, self.refuses = False, ""
         self.holds = False
         self.upstream = Upstream()
@@ -59,7 +59,11 @@ class Bench:
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
         seen = view._replace(unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
         seen = seen._replace(
-            outside=self.outside, touches_down=self.touches_down, on_floor=self.on_floor, foreign=self.foreign
+            outside=self.outside,
+            touches_down=self.touches_down,
+            on_floor=self.on_floor,
+            foreign=self.foreign,
+            settles=self.settles,
         )
         seen = seen._replace(
             height_m=self.height, away=self.away, homeward=self.homeward, piloted=self.piloted, refuses=self.refuses

@@ -110,6 +110,15 @@ def test_whoever_is_flown_out_by_others_is_landed_at_once(new_bench, mode):
     assert bench.watchdog.reason == f"{OUT}, not by our orders"
 
 
+def test_whoever_ends_a_climb_or_was_just_let_go_of_by_a_pilot_has_the_time_of_our_own(new_bench):
+    bench = new_bench().fly()
+    bench.outside, bench.foreign, bench.settles = OUT, True, True
+    assert Action.LAND not in bench.run(1.5) and bench.watchdog.failsafe == Condition.OUTSIDE
+    bench.settles = False
+    assert Action.LAND not in bench.run(0.4)
+    assert bench.run(0.2)[-1] is Action.LAND
+
+
 @pytest.mark.parametrize("foreign", [False, True])
 def test_a_pilot_may_take_it_anywhere_by_the_sticks(new_bench, foreign):
     bench = new_bench().fly()

@@ -124,9 +124,13 @@ class ComingToRest:
 
 
 class DriftFeedback:
-    """Compares the belief of one flying vehicle [world, FLU] with the velocity that its autopilot reports."""
+    """Compares the belief of one flying vehicle [world, FLU] with the velocity that its autopilot reports.
+
+    top_m: no place that it holds is higher [m; world].
+    """
 
     def __init__(self) -> None:
+        self.top_m = math.inf
         self.reset()
 
     def reset(self) -> None:
@@ -255,7 +259,7 @@ class DriftFeedback:
             self.let_go()
             return _STILL
         x, y, z = self._held or self._place_to_rest(now_ns, place)
-        climb_m = (z if height_m is None else height_m) - place[2]
+        climb_m = (min(z, self.top_m) if height_m is None else height_m) - place[2]
         up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_UP_GAIN * climb_m))
         if back is not None:
             self._held = (place[0], place[1], z)

@@ -34,6 +34,7 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import EntityEstimate, Estimate, Vector3
 from groundstation.time_units import NEVER_NS, NS_PER_S
 
+_BELOW_FENCE_M = 0.15  # a height to hold is in the fence, by the output limiter's margin
 _ASKS_NS = 3 * NS_PER_S
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 
@@ -64,6 +65,8 @@ class MavlinkVehicle:
         pad, first_ns = (vehicle.pad_m, vehicle.pad_yaw_rad), FIRST_SIGHT_NS[self.flavour]
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad, first_ns)
         self.orders = Orders(vehicle, self.flavour, self._requests)
+        if settings.safety.fence_m is not None:
+            self.orders.drift.top_m = settings.safety.fence_m[2][1] - _BELOW_FENCE_M
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
         self.misfit, self._namesakes = identity.Misfit(self.flavour, self.system), identity.Namesakes(self.system)

@@ -5,6 +5,7 @@ import pytest
 from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import FrameEncoder
 from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+from groundstation.bus.messages import Verb
 
 GROUND = ("127.0.0.1", 14999)
 FENCE = {"fence_m": ((-1.5, 1.5), (-1.5, 1.5), (0.0, 1.6))}
@@ -102,6 +103,19 @@ def test_our_own_orders_that_lead_out_end_in_a_hover_and_a_landing(fenced):
     rig.until(lambda: rig.mode == "LANDING", 2.5)
     rig.until(lambda: rig.mode == "LANDED", 15.0)
     assert beyond(rig) < 0.8
+
+
+def test_one_on_hold_above_the_fence_comes_down_into_it(fenced):
+    """It holds its height by itself: the tracker leads it back sideways only."""
+    rig = fenced
+    rig.track_on()
+    rig.body.z = 2.0
+    rig.run(0.3)
+    rig.order(Verb.HOLD)
+    rig.run(0.5)
+    assert beyond(rig) > 0.1
+    rig.run(5.0)
+    assert rig.mode == "HOLD" and -0.3 < beyond(rig) < -0.1
 
 
 def test_one_that_was_pushed_out_is_brought_back_by_our_orders(fenced):

@@ -51,59 +51,57 @@ REFUSABLE = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop
 class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
-    resume_within_s: a longer silence of the supervisor, or of a vehicle with wrong values, needs a RESUME; likewise
-    tracker_resume_within_s: of the tracker, or of any part between it and here; gap_s: a pause of our own loop.
-    unresumed_land_s: it lands if no RESUME comes for so long (after a pause of the tracker: land_after_s).
-    cut_s: it may fly on after an order to cut its motors. brake_s: hover before landing
-    when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise explain while
-    at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes (flown by others, lands), for
-    fast_resume_s it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands:
-    from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. stray_again_s: within this of a first
-    stray it lands if it strays once more though it hovers. blind_land_s: likewise while its sensors
-    are wrong and no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that
-    need one.
-    crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
-    by 0.1 m in that time. floor_land_s: likewise on the floor. away_told_s: for so long a landing vehicle rises or
-    flies fast before that is told; a healthy one has braked from its take-off in half of it. sinks_m_s, landing_s: the
-    slowest descent, and what a landing takes beyond it. stands_told_s: it may stand on the floor with running motors
-    before that is told; PX4 notices its landing and stops them within 4 s. pad_m: where it takes off [x, y;
-    world], if known; min_separation_m: least distance of all airborne vehicles from there, and from it in flight.
-    fence_m: low and high along x, y and z [world], if known; outside_hover_s: outside of it for so long it hovers: one
-    that was pushed out at 0.6 m/s is on its way back by then; flown_outside_s: likewise it lands, if others fly it.
+    *_hover_s, *_brake_s, *_land_s, *_told_s: for so long a condition lasts before the vehicle hovers, brakes or lands
+    for it, or the operator is told. *resume_*: from then on it waits for RESUME.
     """
 
+    # Silences: of setpoints, of supervisor or vehicle, of the tracker or any part on its way, of this driver's loop.
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
     land_after_s: float = _SAFETY.land_after_s
+    resume_within_s: float = 1.0
+    tracker_resume_within_s: float = 0.5
+    gap_s: float = 0.5
+    # It lands if no RESUME comes for so long; after a pause of the tracker within land_after_s.
+    unresumed_land_s: float = 30.0
+    # Hover before landing when it is unknown what the vehicle was doing.
+    brake_s: float = 1.0
     unseen_land_after_s: float = _SAFETY.unseen_land_after_s
     battery_min: float = 0.15
     battery_hold_s: float = 3.0
-    resume_within_s: float = 1.0
-    tracker_resume_within_s: float = 0.5
-    unresumed_land_s: float = 30.0
-    gap_s: float = 0.5
-    brake_s: float = 1.0
+    # Orders: until it flies, until its emergency is cleared, and how long it may fly on after CUT.
     take_off_s: float = 10.0
     clear_s: float = 2.0
     cut_s: float = 2.0
+    # What is commanded at most. Actual speeds beyond what gusts and noise explain brake it; flown by others, it lands.
     max_speed_m_s: float = 0.6
     max_climb_m_s: float = 0.4
     fast_brake_s: float = 0.1
     fast_resume_s: float = 0.5
     fast_land_s: float = 1.6
+    # It strays from its commands: from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s; doubled. If it
+    # strays once more within the second time, though it hovers, it lands.
     stray_land_s: float = 1.6
     stray_again_s: float = 5.0
+    # Its sensors are wrong, and no camera sees it.
     blind_land_s: float = 1.6
+    # Without a position from the cameras, for vehicles that need one.
     lost_hover_s: float = 0.3
     lost_land_s: float = 0.7
+    # Nearer to another than allowed, so that it makes way: the limiter moves each of two by 0.1 m in that time.
+    min_separation_m: float = 0.6
     crowded_land_s: float = 2.0
     floor_land_s: float = 0.3
+    # A landing vehicle rises or flies fast; a healthy one has braked from its take-off in half of this.
     away_told_s: float = 2.0
+    # The slowest descent, and what a landing takes beyond it.
     sinks_m_s: float = 0.3
     landing_s: float = 5.0
+    # It stands on the floor with running motors: PX4 notices its landing and stops them within 4 s.
     stands_told_s: float = 5.0
+    # Where it takes off [x, y; world], and the fence, low and high along x, y and z [world], if known.
     pad_m: tuple[float, float] | None = None
-    min_separation_m: float = 0.6
     fence_m: Bounds | None = None
+    # One that was pushed out at 0.6 m/s is on its way back within the first.
     outside_hover_s: float = 1.0
     flown_outside_s: float = 0.5
 
@@ -119,59 +117,44 @@ class WatchdogLimits:
 
 
 class VehicleView(NamedTuple):
-    """The vehicle's state by its reports; fresh: telemetry is younger than 0.3 s.
-
-    not_ready: why it may not take off, or "". configured: the driver has prepared it for flight; a driver of a standing
-    vehicle is not READY before. unsound: why its reported motion cannot be true, or ""; it then counts as silent.
-    velocity_m_s: the reported one, scaled to the true one; None if it reports none. By the host: speed_m_s,
-    horizontal; climb_m_s, of one that others fly; stray: how the vehicle strays from its commands, or "", and stray_by,
-    which of its velocities says so; seen: whether cameras show its speed. unseen_s: how long its estimate may have been
-    wrong, by the tracker; near: airborne vehicle too near to its pad, or ""; crowded: why it makes way for another that
-    is too near in flight, or ""; outside: how far it is outside the fence, if not on its way back to us, or "". lost_s:
-    how long it has lacked a position that it needs; unlocated: whose, and since when, in words. clears: whether a
-    separate order ends its emergency without starting motors.
-    mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
-    down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
-    homeward: how it flies home or climbs by itself, and in which mode, or "".
-    foreign: others fly it, so its speed is judged, but not by our commands; settles: not even that, for it ends a climb
-    by itself, or a pilot has just let go of it; piloted: a pilot's sticks may move it.
-    rises: in HOVER it continues to its take-off height. fell: that it fell since its last start, or "". refuses: its
-    answer to the order to take off, if that refused for good; unarmed: why it does not start its motors yet though it
-    is to take off, in its own words, or "".
-    """
+    """The vehicle's state by its reports, and what the host adds from estimates and cameras. Words are "" if not so."""
 
     flight_state: FlightState = FlightState.UNKNOWN
-    fresh: bool = False
+    fresh: bool = False  # telemetry is younger than 0.3 s
     battery: float | None = None
-    not_ready: str = ""
-    configured: bool = True
-    unsound: str = ""
-    velocity_m_s: Vector3 | None = None
+    not_ready: str = ""  # why it may not take off
+    configured: bool = True  # the driver has prepared it for flight: while it stands it is not READY before
+    unsound: str = ""  # why its reported motion cannot be true: it then counts as silent
+    velocity_m_s: Vector3 | None = None  # the reported one, scaled to the true one; None: it reports none
+    # By the host: horizontal speed, and climb of one that others fly.
     speed_m_s: float = 0.0
     climb_m_s: float = 0.0
+    # How it strays from its commands, which of its velocities says so, and whether cameras show its speed.
     stray: str = ""
     stray_by: str = ""
     seen: bool = False
-    unseen_s: float = 0.0
-    near: str = ""
-    crowded: str = ""
-    outside: str = ""
+    unseen_s: float = 0.0  # how long its estimate may have been wrong, by the tracker
+    near: str = ""  # airborne vehicle too near to its pad
+    crowded: str = ""  # why it makes way for another that is too near in flight
+    outside: str = ""  # how far it is outside the fence, if not on its way back to us
+    # How long it has lacked a position that it needs; whose, and since when, in words.
     lost_s: float = 0.0
     unlocated: str = "from the cameras"
-    clears: bool = False
-    mute: str = ""
+    clears: bool = False  # a separate order ends its emergency without starting motors
+    mute: str = ""  # the report that it lacks although telemetry arrives
+    # By its estimate: it comes down to the floor, it is there, and its height.
     touches_down: bool = False
     on_floor: bool = False
     height_m: float = 0.0
-    away: str = ""
-    homeward: str = ""
-    foreign: bool = False
-    settles: bool = False
-    piloted: bool = False
-    rises: bool = False
-    fell: str = ""
-    refuses: str = ""
-    unarmed: str = ""
+    away: str = ""  # how it moves without sinking, by cameras
+    homeward: str = ""  # how it flies home or climbs by itself, and in which mode
+    foreign: bool = False  # others fly it, so its speed is judged, but not by our commands
+    settles: bool = False  # not even its speed: it ends a climb by itself, or a pilot has just let go of it
+    piloted: bool = False  # a pilot's sticks may move it
+    rises: bool = False  # in HOVER it continues to its take-off height
+    fell: str = ""  # that it fell since its last start
+    refuses: str = ""  # its answer to the order to take off, if that refused for good
+    unarmed: str = ""  # why it does not start its motors yet though it is to take off, in its own words
 
     @property
     def plausible(self) -> "VehicleView":

@@ -12,6 +12,8 @@ from groundstation.time_units import NS_PER_S
 
 # An older setpoint is not part of a continuous stream.
 _STREAM_S = 0.15
+# From then on an order gives a row with `anew` its whole time once more.
+_BEGUN_S = 1.0
 # The most credit that a condition has when it is met anew, however long ago the last check was.
 _FIRST_S = 0.05
 # A coming reaction is reported once its condition has lasted for _LASTING_S and it is due within _NEAR_S; after
@@ -283,10 +285,11 @@ class Evidence:
         else:
             self._waits = {Condition.LEFT_WAITING: at.now_ns}
 
-    def suspends(self, mode: DriverMode) -> bool:
-        """Return whether a condition holds for which a vehicle in a mode has to hover."""
-        lasted = ((row, self.against_s(row)) for row in self._table if row.reaction is Reaction.HOVER)
-        return any(row.applies(mode, lasted_s) for row, lasted_s in lasted)
+    @property
+    def forbids_way_back(self) -> bool:
+        """Return whether a tracking vehicle would have to hover, be it for anything but what the way back ends."""
+        hovers = (row for row in self._table if row.reaction is Reaction.HOVER and row.condition != Condition.OUTSIDE)
+        return any(row.applies(DriverMode.TRACK, self.against_s(row)) for row in hovers)
 
     def soonest(self, mode: DriverMode, reaction: Reaction) -> Outlook | None:
         """Return which row with a reaction acts first if nothing changes, and when; None: none is to be reported."""
@@ -305,12 +308,12 @@ class Evidence:
         self._anew_s.clear()
         self._return.forget()
 
-    def pardon(self, hovers_for: str = "") -> None:
+    def pardon(self) -> None:
         """Begin anew for the rows that an order to go on ends; their conditions go on counting for all others.
 
-        hovers_for: a condition, or "". Rows that land for it may begin anew, too; once, until it has worn off.
+        So do rows with `anew`: once, until their condition has worn off, and not for what has hardly begun.
         """
         self._pardoned_s = dict(self.charged_s)
-        for condition in self.charged_s.keys() & {hovers_for}:
-            self._anew_s[condition] = self._anew_s.get(condition) or self.charged_s[condition]
+        begun = ((condition, lasted_s) for condition, lasted_s in self.charged_s.items() if lasted_s >= _BEGUN_S)
+        self._anew_s |= {condition: self._anew_s.get(condition) or lasted_s for condition, lasted_s in begun}
         self._return.forget()

@@ -96,8 +96,8 @@ class Failsafe:
     after_s: how long the condition must have lasted (its debounce). forgets: seconds of decay per second without it
     (its hysteresis); None: all at once. modes: in which it counts. text: for the operator; `{why}` is filled in from
     the evidence. brake: hover first, because it is unknown what the vehicle was doing. limit: the setting that gives
-    the time, of which after_s leaves out what has passed before the condition is noticed. anew: once, TRACK or
-    RESUME in a hover for this condition begin its time anew.
+    the time, of which after_s leaves out what has passed before the condition is noticed. anew: TRACK or
+    RESUME begin its time anew, once until its condition has worn off.
     """
 
     condition: Condition

@@ -184,7 +184,7 @@ class Watchdog:
                 return "the tracker was restarted: RESUME is needed"
             if not self.gate.adopt(now_ns):
                 return "the restarted tracker has no converged belief of this drone yet"
-        self.evidence.pardon(self.failsafe)
+        self.evidence.pardon()
         return self._enter(now_ns, DriverMode.TRACK, f"tracking for {command.issuer}")
 
     def _enter(self, now_ns: int, mode: DriverMode, reason: str, row: Failsafe | None = None) -> str:
@@ -257,7 +257,7 @@ class Watchdog:
         waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and self.failsafe in KEPT_IN_PLACE
         if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
             return None
-        return None if self.evidence.suspends(DriverMode.TRACK) else setpoint.velocity_m_s
+        return None if self.evidence.forbids_way_back else setpoint.velocity_m_s
 
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
         return Situation(

@@ -257,9 +257,9 @@ def test_orders_that_are_repeated_put_off_no_landing(new_bench, name, verb, peri
         lands = bench.step(round(TURN_S * S)).action in DOWN
         landed_s = turn * TURN_S if lands and landed_s is None else landed_s
         assert lands or landed_s is None, "an order undid the landing"
-    # The first that ends a hover outside the fence gives it the time to come back.
-    more_s = period_s if Condition.OUTSIDE in one.conditions and verb is not Verb.HOLD else 0.0
-    assert landed_s is not None and landed_s <= one.land_s + 2.0 * more_s + 0.1
+    # The first one after a second outside the fence gives it the time to come back.
+    more_s = 1.0 + period_s if Condition.OUTSIDE in one.conditions and verb is not Verb.HOLD else 0.0
+    assert landed_s is not None and landed_s <= one.land_s + more_s + 0.1
 
 
 def test_pairs_of_the_same_input_are_few():

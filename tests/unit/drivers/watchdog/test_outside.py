@@ -143,3 +143,38 @@ def test_one_that_stands_outside_may_take_off(new_bench):
     bench.run(5.0)
     assert bench.watchdog.mode is DriverMode.LANDED
     assert bench.order(Verb.TAKEOFF).stage is AckStage.ACCEPTED
+
+
+def test_being_outside_does_not_withhold_the_way_back_that_ends_it(new_bench):
+    bench = new_bench().fly()
+    bench.order(Verb.HOLD)
+    bench.holds, bench.outside = True, OUT
+    for _ in range(80):
+        bench.step()
+        assert bench.decision.back_m_s is not None
+    assert bench.watchdog.mode is DriverMode.HOLD
+
+
+@pytest.mark.parametrize("stray_s", [2.3, 2.8])
+def test_an_order_to_go_on_from_another_hover_gives_it_the_time_too(new_bench, stray_s):
+    bench = new_bench().fly()
+    bench.outside, bench.stray, bench.stray_by = OUT, "0.5 m/s, 0.0 m/s asked", "cameras"
+    bench.run(0.3)
+    bench.stray = bench.stray_by = ""
+    bench.run(stray_s - 0.3)
+    assert bench.watchdog.failsafe == Condition.STRAYS
+    bench.see()
+    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    assert set(bench.run(0.9)) == {Action.FLY}
+
+
+def test_an_order_soon_after_it_went_out_leaves_the_later_one_its_time(new_bench):
+    bench = new_bench().fly()
+    bench.outside = OUT
+    bench.run(0.5)
+    bench.see()
+    bench.order(Verb.RESUME)
+    bench.run(2.0)
+    bench.see()
+    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    assert set(bench.run(0.9)) == {Action.FLY}

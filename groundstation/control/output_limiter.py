@@ -1,5 +1,6 @@
-"""The last step before a setpoint is sent: shrinks a velocity or hovers; adds velocity only against a drift, or to lead
-a robot back into the fence.
+"""The last step before a setpoint is sent: shrinks a velocity or hovers.
+
+It adds velocity only against a drift, or to lead a robot back into the fence.
 
 Why its half-spaces keep fence and separation for any wanted velocity: docs/explanation/safety.md#why-it-holds.
 """
@@ -30,6 +31,8 @@ _NO_SHAFTS: Mapping[str, Shaft] = MappingProxyType({})
 _ROUND = np.array([(math.cos(a), math.sin(a), 0.0) for a in np.arange(16) * (2.0 * math.pi / 16)])
 # A velocity that was clipped to a limit, or asked for at it, may exceed it by this much.
 _ROUNDING_M_S = 1e-10
+# Trials for the share of a way back: the whole of it first, at last 2 mm/s.
+_TRIALS = 7
 _UP_DOWN = np.array(((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)))
 
 
@@ -85,18 +88,31 @@ def limit_setpoint(
 
 
 def _returning(wanted: Array, walls: list[Wall], limits: MotionLimits) -> tuple[Array, list[int]]:
-    """Return the nearest velocity that also leads back who is beyond the fence, unless that costs what walls demand."""
-    velocity, met = _nearest(wanted, walls, limits)
+    """Return the nearest velocity that also leads back who is beyond the fence, as far as no wall loses by it.
+
+    The largest such share of the way back is taken, so that it changes little from turn to turn.
+    """
+    found = _nearest(wanted, walls, limits)
     if not any(wall.back for wall in walls):
-        return velocity, met
-    back, met_back = _nearest(wanted, [led_back(wall) for wall in walls], limits)
-    costs = _excess(back, walls) > max(0.0, _excess(velocity, walls)) + TOLERANCE_M_S
-    return (velocity, met) if costs else (back, met_back)
+        return found
+    allowed = [max(0.0, excess_m_s) + TOLERANCE_M_S for excess_m_s in _excesses(found[0], walls)]
+    share, step = 1.0, 0.5
+    for _ in range(_TRIALS):
+        back = _nearest(wanted, [led_back(wall, share) for wall in walls], limits)
+        if all(excess <= most for excess, most in zip(_excesses(back[0], walls), allowed, strict=True)):
+            found = back
+            if share == 1.0:
+                break
+            share += step
+        else:
+            share -= step
+        step *= 0.5
+    return found
 
 
-def _excess(velocity: Array, walls: list[Wall]) -> float:
+def _excesses(velocity: Array, walls: list[Wall]) -> list[float]:
     x, y, z = velocity.tolist()
-    return max(dot(wall.normal, (x, y, z)) - wall.most for wall in walls)
+    return [dot(wall.normal, (x, y, z)) - wall.most for wall in walls]
 
 
 def _nearest(wanted: Array, walls: list[Wall], limits: MotionLimits) -> tuple[Array, list[int]]:

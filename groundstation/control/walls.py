@@ -58,9 +58,9 @@ def held_off(wall: Wall, drift: Vector3, parameters: SafetyParameters) -> Wall:
     return wall._replace(most=wall.most - allowed)
 
 
-def led_back(wall: Wall) -> Wall:
-    """Return the wall that leads a robot beyond it back."""
-    return wall._replace(most=wall.most - wall.back)
+def led_back(wall: Wall, share: float) -> Wall:
+    """Return the wall that leads a robot beyond it back, at a share of the speed."""
+    return wall._replace(most=wall.most - share * wall.back)
 
 
 def turning(wall: Wall, rate: float, reaction_s: float) -> Wall:

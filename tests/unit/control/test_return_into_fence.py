@@ -16,6 +16,7 @@ from groundstation.control.hovering import Hovering
 from groundstation.control.output_limiter import limit_setpoint
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
+from groundstation.control.walls import held_off, walls_around
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
 from groundstation.planning.parameters import MotionLimits
@@ -175,3 +176,26 @@ def test_a_hovering_robot_chooses_its_place_inside():
         kept_m = flight.safety.margin_m
         assert flight.beyond_m < -kept_m + 0.02
         assert math.hypot(*flight.velocity) < 0.06
+
+
+def test_no_wall_loses_by_the_way_back():
+    """Not even where walls are in conflict: others near it, drifts, and the corner of a low room."""
+    layout = LAYOUT.with_entity("b", EntityKind.ROBOT, ROBOT_CORE).with_entity("c", EntityKind.ROBOT, ROBOT_CORE)
+    low = replace(SAFETY, fence=(*SAFETY.fence[:2], (0.3, 1.6)))
+    still, rng, led = dict.fromkeys("abc", np.zeros(3)), np.random.default_rng(7), 0
+    for _ in range(2000):
+        place = np.array((3.0, 3.0, 1.0)) + rng.uniform((0.0, -0.5, -0.5), (0.5, 0.5, 1.6))
+        others = [place + rng.uniform(-0.8, 0.8, 3) for _ in range(2)]
+        mean = np.concatenate([np.append(at, 0.0) for at in (place, *others)])
+        belief = JointBelief(mean, rng.uniform(0.02, 0.3) ** 2 * np.eye(12), layout, 0)
+        wanted = Setpoint(tuple(rng.uniform(-0.3, 0.3, 3).tolist()), 0.0, FlightMode.TRACK)
+        drift = rng.uniform(-0.2, 0.2, 3)
+        walls = [held_off(wall, tuple(drift.tolist()), low) for wall in walls_around("a", belief, low, still, {})]
+        excesses = []
+        for safety in (replace(low, return_m_s=0.0), low):
+            told = limit_setpoint("a", wanted, belief, 0, safety, still, {"a": drift}).setpoint.velocity_m_s
+            excesses.append(np.array([np.dot(wall.normal, told) - wall.most for wall in walls]))
+        without, led_back = excesses
+        assert np.all(led_back <= np.maximum(0.0, without) + 1e-6)
+        led += not np.allclose(led_back, without)
+    assert led > 300

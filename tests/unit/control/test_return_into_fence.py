@@ -61,9 +61,9 @@ class Flight:
         told = sent.setpoint.velocity_m_s
         if not self.tracks:
             told = self.way_back.step(self.now_ns, told if sent.holds else None) or (0.0, 0.0, 0.0)
-        told = np.array(told)
-        self.watch.note_command(told)
-        self.under_way.append(told)
+        velocity = np.array(told)
+        self.watch.note_command(velocity)
+        self.under_way.append(velocity)
         self.velocity = self.velocity + (self.under_way.popleft() - self.velocity) * TICK_S / LAG_S
         self.place = self.place + (self.velocity + self.drift) * TICK_S
         self.fastest_m_s = max(self.fastest_m_s, float(np.abs(self.velocity).max()))

@@ -67,25 +67,25 @@ def test_one_that_another_station_moves_inside_is_left_alone(fenced):
     assert rig.mode == "TRACK"
 
 
-@pytest.mark.parametrize("transmitter", [True, False])
-def test_a_pilot_may_fly_it_out_while_a_transmitter_is_heard(fenced, transmitter):
-    rig, mode = fenced, _STICKS[fenced.flavour]
+def take_sticks(rig, transmitter):
+    """Let a pilot take a tracking vehicle by the sticks; transmitter: whether it is heard. Returns the mode."""
     rig.emulator.firmware.parameters.values["FS_THR_ENABLE"] = 3
     rig.track_on()
     rig.emulator.firmware.transmitter = transmitter
     rig.run(1.0)
-    rig.emulator.firmware.enter(mode)
+    rig.emulator.firmware.enter(_STICKS[rig.flavour])
+    return _STICKS[rig.flavour]
+
+
+@pytest.mark.parametrize("transmitter", [True, False])
+def test_a_pilot_may_fly_it_out_while_a_transmitter_is_heard(fenced, transmitter):
+    rig, mode = fenced, take_sticks(fenced, transmitter)
     landed_m = flown(rig, mode, (0.4, 0.0, 0.0), 6.0)
     assert (landed_m is None) is transmitter and beyond(rig) > 0.1
 
 
 def test_one_that_a_pilot_let_go_of_outside_may_settle_before_it_is_landed(fenced):
-    rig, mode = fenced, _STICKS[fenced.flavour]
-    rig.emulator.firmware.parameters.values["FS_THR_ENABLE"] = 3
-    rig.track_on()
-    rig.emulator.firmware.transmitter = True
-    rig.run(1.0)
-    rig.emulator.firmware.enter(mode)
+    rig, mode = fenced, take_sticks(fenced, True)
     assert flown(rig, mode, (0.4, 0.0, 0.0), 6.0) is None and beyond(rig) > 0.1
     rig.emulator.firmware.enter(_HOLDS[rig.flavour])
     assert flown(rig, _HOLDS[rig.flavour], (0.0, 0.0, 0.0), 1.4) is None

@@ -9,6 +9,12 @@ from groundstation.bus.messages import AckStage, FlightState, Verb
 OUT = "it is 0.4 m outside the fence"
 
 
+def go_on(bench, verb=Verb.RESUME):
+    """Order it to go on, at a setpoint that it has seen."""
+    bench.see()
+    assert bench.order(verb).stage is AckStage.ACCEPTED
+
+
 def test_it_hovers_until_resume_and_lands_unless_it_comes_back(new_bench):
     bench = new_bench().fly()
     bench.outside = OUT
@@ -35,8 +41,7 @@ def test_a_tracker_may_bring_it_back_once_the_operator_says_so(new_bench):
     bench.outside = OUT
     bench.run(1.5)
     assert bench.decision.action is Action.HOVER
-    bench.see()
-    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    go_on(bench)
     assert set(bench.run(0.8)) == {Action.FLY}
     bench.outside = ""  # on its way back
     assert set(bench.run(10.0)) == {Action.FLY}
@@ -58,8 +63,7 @@ def test_an_order_to_go_on_gives_it_the_time_to_come_back(new_bench, verb, waite
     bench = new_bench().fly()
     bench.outside = OUT
     bench.run(waited_s)
-    bench.see()
-    assert bench.order(verb).stage is AckStage.ACCEPTED
+    go_on(bench, verb)
     assert set(bench.run(0.9)) == {Action.FLY} and bench.watchdog.lands_in_s == pytest.approx(2.1, abs=0.1)
     assert set(bench.run(2.0)[5:]) == {Action.HOVER}
     assert bench.run(0.3)[-1] is Action.LAND
@@ -163,8 +167,7 @@ def test_an_order_to_go_on_from_another_hover_gives_it_the_time_too(new_bench, s
     bench.stray = bench.stray_by = ""
     bench.run(stray_s - 0.3)
     assert bench.watchdog.failsafe == Condition.STRAYS
-    bench.see()
-    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    go_on(bench)
     assert set(bench.run(0.9)) == {Action.FLY}
 
 
@@ -175,6 +178,5 @@ def test_an_order_soon_after_it_went_out_leaves_the_later_one_its_time(new_bench
     bench.see()
     bench.order(Verb.RESUME)
     bench.run(2.0)
-    bench.see()
-    assert bench.order(Verb.RESUME).stage is AckStage.ACCEPTED
+    go_on(bench)
     assert set(bench.run(0.9)) == {Action.FLY}
